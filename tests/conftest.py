@@ -1,0 +1,19 @@
+"""Strict JAX settings for every test, and where the real data lies."""
+
+from pathlib import Path
+
+import jax
+import pytest
+
+jax.config.update("jax_numpy_dtype_promotion", "strict")
+jax.config.update("jax_numpy_rank_promotion", "raise")
+jax.config.update("jax_debug_nans", False)
+
+DATA_FOLDER = Path(__file__).resolve().parents[2] / "shared" / "data"
+
+
+@pytest.fixture(scope="session")
+def data_folder() -> Path:
+    if not DATA_FOLDER.is_dir():
+        pytest.skip(f"real data absent: {DATA_FOLDER} is not a folder")
+    return DATA_FOLDER
