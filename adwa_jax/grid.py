@@ -77,7 +77,10 @@ def bilinear(field: DistanceField, x: jax.Array, y: jax.Array) -> jax.Array:
     fraction_u, fraction_v = u - column.astype(jnp.float32), v - row.astype(jnp.float32)
     flat = field.distance.reshape(-1)
     index = row * columns + column
-    value = partial(jnp.take, flat, mode="clip")
+
+    def value(place: jax.Array) -> jax.Array:
+        return flat.at[place].get(mode="promise_in_bounds")
+
     below = value(index) + fraction_u * (value(index + 1) - value(index))
     above = value(index + columns) + fraction_u * (value(index + columns + 1) - value(index + columns))
     return below + fraction_v * (above - below)

@@ -11,7 +11,7 @@ from adwa_jax.checks import require, require_numbers
 from adwa_jax.density import Density, obstacle_density
 from adwa_jax.grid import Grid
 
-Scope = Literal["start", "node"]
+Scope = Literal["start", "node", "one"]
 MAX_WEIGHT = 16.0  # the search's integer costs leave room for weights up to this
 
 

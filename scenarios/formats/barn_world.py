@@ -31,8 +31,8 @@ GOAL_TOLERANCE = 1.0  # [m]
 TIME_LIMIT = 100.0  # [s]
 TASK_ROWS = 96  # of a scenario's map: 14.4 m, so that the goal and the disc around it lie on the map
 
-# The benchmark's own conversion of path cells to metres, by which it measures its reference lengths. It lies a
-# column to the left of the cylinders' lattice.
+# The benchmark's own conversion of path cells to metres, by which it measures its reference lengths. It lies
+# a column to the left of the cylinders' lattice.
 _PATH_ORIGIN = (-4.575, 5.075)  # [m]
 
 _LATTICE_SLACK = 0.01  # [m]
@@ -41,11 +41,11 @@ _KIND = "a BARN world"
 
 
 def load_barn_world(path: str | Path) -> MapFile:
-    """Read a `.world` or `.world.gz` as its map of 64 × 30 cells of 0.15 m, enclosed cells filled
-    (`fill_enclosed`).
+    """Read a `.world` or `.world.gz` as its map of 64 × 30 cells of 0.15 m.
 
-    Raises InputError for a file that is no Gazebo world, for models other than the ground and BARN's
-    cylinders (their collisions would be missed in silence), and for cylinders off the lattice.
+    Enclosed cells are filled (`fill_enclosed`). Raises InputError for a file that is no Gazebo world, for
+    models other than the ground and BARN's cylinders (their collisions would be missed in silence), and for
+    cylinders off the lattice.
     """
     occupied = fill_enclosed(lattice(_cylinders(path), str(path)))
     return MapFile(name=str(path), occupied=occupied, unknown=np.zeros_like(occupied), resolution=RESOLUTION,
@@ -74,8 +74,7 @@ def load_barn_scenario(world_path: str | Path, path_file: str | Path | None = No
 
 
 def load_barn_folder(folder: str | Path) -> list[tuple[str, Scenario]]:
-    """Every `*.world` and `*.world.gz` of a folder as (name, Scenario), in the order of the numbers in their
-    names.
+    """Every `*.world` and `*.world.gz` of a folder as (name, Scenario), world_2 before world_10.
 
     The path file of `world_7.world` is `path_7.npy`, beside it, in a folder `path_files` inside, or in one
     next to the folder. Raises InputError where there is no world, no path file for one, or two files of one
@@ -94,14 +93,15 @@ def load_barn_folder(folder: str | Path) -> list[tuple[str, Scenario]]:
         if names.count(name) > 1:
             raise bad_input(path, f"world {name} is there twice", "one file for each world", "remove one")
     path_files = [_path_file(path) for path in worlds]
-    return [(name, load_barn_scenario(*files)) for name, *files in zip(names, worlds, path_files, strict=True)]
+    scenarios = map(load_barn_scenario, worlds, path_files)
+    return list(zip(names, scenarios, strict=True))
 
 
 def lattice(centres: np.ndarray, where: str) -> np.ndarray:
-    """[64, 30] bool: the cells that hold a cylinder. centres: [n, 2], x, y [m]; `where` names their file in
-    errors.
+    """[64, 30] bool: the cells that hold a cylinder.
 
-    Raises InputError for a centre farther than 1 cm from a cell's, or outside the lattice.
+    centres: [n, 2], x, y [m]; where: their file, for errors. Raises InputError for a centre farther than 1 cm
+    from a cell's, or outside the lattice.
     """
     offset = np.asarray(centres, np.float64).reshape(-1, 2) - np.asarray(ORIGIN)
     cells = np.rint(offset / RESOLUTION - 0.5)
@@ -215,11 +215,12 @@ def _parse(path: str | Path) -> ElementTree.Element:
                         "fetch it again, or drop .gz from the name of an unpacked one") from None
     except ElementTree.ParseError as error:
         raise bad_input(f"{path}:{error.position[0]}", f"is not XML ({error})",
-                        f"{_KIND} is a Gazebo world (SDF)", "check that this is such a file, complete") from None
+                        f"{_KIND} is a Gazebo world (SDF)",
+                        "check that this is such a file, complete") from None
 
 
 def _foreign(path: str | Path, found: str) -> InputError:
-    return bad_input(path, found, f"{_KIND} holds only the ground and cylinders of radius {CYLINDER_RADIUS} m",
+    return bad_input(path, found, f"{_KIND} holds the ground and cylinders of radius {CYLINDER_RADIUS} m",
                      "remove it, or give the world as an image map")
 
 
@@ -243,5 +244,5 @@ def _path_file(world: Path) -> Path:
         if (folder / name).is_file():
             return folder / name
     raise bad_input(world, f"no path file {name}",
-                    "it lies beside the world, or in a folder path_files inside the world's folder or next to it",
+                    "it lies beside the world, or in a folder path_files inside or next to that folder",
                     f"put {name} there")

@@ -14,13 +14,14 @@ _LOADERS = {".map": load_movingai_map, ".yaml": load_ros_map, ".yml": load_ros_m
 
 
 def load_map(path: str | Path, resolution: float = 1.0) -> MapFile:
-    """Read a MovingAI `.map`, a ROS `.yaml`, a BARN `.world` (or `.world.gz`) or a plain image; case does not
-    matter.
+    """Read a MovingAI `.map`, a ROS `.yaml`, a BARN `.world` or `.world.gz`, or a plain image.
 
-    `resolution` [m] is the side of a pixel of a plain image; the other formats state their own. Raises
-    InputError for any other suffix, and as the formats' loaders do.
+    The case of the suffix does not matter. `resolution` [m] is the side of a pixel of a plain image; the
+    other formats state their own. Raises InputError for any other suffix, and as the formats' loaders do.
     """
     name = Path(path).name.lower()
+    if Path(path).is_dir():
+        raise bad_input(path, "is a folder", "a map is one file", "name the file inside it")
     if name.endswith(IMAGE_SUFFIXES):
         return load_image_map(path, resolution)
     for suffix, loader in _LOADERS.items():

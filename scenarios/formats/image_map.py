@@ -86,12 +86,11 @@ def read_pixels(path: str | Path) -> Pixels:
 
 
 def _pixels_of(image: Image.Image) -> Pixels:
-    """Decode: one channel for grey images, three for coloured ones, and the alpha channel where there is
-    one.
-    """
+    """Decode: one channel for grey images, three for coloured ones, and any alpha channel."""
     if image.has_transparency_data:
         array = np.asarray(image.convert("RGBA"))
-        return Pixels(total=array[..., :3].sum(axis=2, dtype=np.int32), channels=3, alpha=array[..., 3].copy())
+        total = array[..., :3].sum(axis=2, dtype=np.int32)
+        return Pixels(total=total, channels=3, alpha=array[..., 3].copy())
     if image.mode in ("1", "L"):
         return Pixels(total=np.asarray(image.convert("L")).astype(np.int32), channels=1, alpha=None)
     array = np.asarray(image.convert("RGB"))

@@ -14,9 +14,7 @@ def leaf(value: Any, dtype: Any) -> Any:
 
 
 def numpy_grid(occupied: np.ndarray, resolution: float, origin: tuple[float, float]) -> Grid:
-    """A Grid with numpy leaves whose map is the whole of `occupied`, [H, W] bool; resolution and origin in
-    metres.
-    """
+    """A Grid whose map is the whole of `occupied`, [H, W] bool; resolution and origin in metres."""
     height, width = occupied.shape
     return Grid(occupied=leaf(occupied, np.bool_), height=leaf(height, np.int32), width=leaf(width, np.int32),
                 resolution=leaf(resolution, np.float32), origin=leaf(origin, np.float32))

@@ -28,13 +28,13 @@ class MapFile:
     origin: tuple[float, float]  # x, y of the outer corner of cell (0, 0) [m]
     yaw: float = 0.0  # turn of the map's x axis from the world's [rad]
     y_down: bool = False  # True: y grows downwards in this format, so pictures turn the y axis round
-    occupancy: np.ndarray | None = None  # [H, W] int8, 0..100 or -1 unknown, where the format has graded values
+    occupancy: np.ndarray | None = None  # [H, W] int8, 0..100 or -1 unknown, where graded
 
     def __post_init__(self):
         positive_number(f"{self.name}, resolution", self.resolution, "give the side of a cell in metres")
-        masks = (self.occupied, self.unknown)
-        if any(mask.dtype != np.bool_ or mask.shape != self.occupied.shape or mask.ndim != 2 for mask in masks):
-            raise ValueError(f"{self.name}: occupied and unknown must be bool arrays [H, W] of one shape")
+        shape = self.occupied.shape
+        if any(mask.dtype != np.bool_ or mask.shape != shape for mask in (self.occupied, self.unknown)):
+            raise ValueError(f"{self.name}: occupied and unknown must be bool arrays of one shape [H, W]")
         if (self.occupied & self.unknown).any():
             raise ValueError(f"{self.name}: a cell cannot be both occupied and unknown")
 
@@ -77,6 +77,6 @@ class MapFile:
         height, width = self.occupied.shape
         unknown = int(self.unknown.sum())
         among = f", {unknown} of them unknown and counted as occupied" if unknown_counted and unknown else ""
-        remedy = "let unknown cells count as free" if among else "check the map's thresholds, negate and contents"
+        remedy = "let unknown cells count as free" if among else "check the map and, if any, its thresholds"
         return bad_input(self.name, f"no free cell among {height} x {width}{among}",
                          "a map needs at least one free cell", remedy)

@@ -51,8 +51,7 @@ class ScenEntry:
 
 
 def load_movingai_map(path: str | Path) -> MapFile:
-    """Read a `.map`: `.`, `G`, `S` free; `@`, `O`, `T` occupied, and `W` (water, joined only to water)
-    occupied too.
+    """Read a `.map`: `.`, `G`, `S` free; `@`, `O`, `T`, `W` occupied (`W`, water, joins only water).
 
     Resolution 1 m, origin (0, 0), y_down. Raises InputError naming file and line for any other header,
     character, row length or number of rows; blank lines may follow the last row.
@@ -82,11 +81,13 @@ def _map_size(path: str | Path, lines: Sequence[str]) -> tuple[int, int]:
     sizes: list[int] = []
     for index, (keyword, value) in enumerate(wanted):
         if index >= len(lines):
-            raise bad_input(f"{path}:{len(lines)}", f"the file ends before '{keyword}'", _LAYOUT, "fetch the map again")
+            raise bad_input(f"{path}:{len(lines)}", f"the file ends before '{keyword}'", _LAYOUT,
+                            "fetch the map again")
         words = lines[index].split()
         fits = words == ["map"] if keyword == "map" else len(words) == 2 and words[0] == keyword
         if not fits or (value is not None and words[1] != value):
-            raise bad_input(f"{path}:{index + 1}", shown(lines[index]), _LAYOUT, "check that this is such a map")
+            raise bad_input(f"{path}:{index + 1}", shown(lines[index]), _LAYOUT,
+                            "check that this is such a map")
         if keyword in ("height", "width"):
             sizes.append(_whole(f"{path}:{index + 1}", keyword, words[1], least=1))
     return sizes[0], sizes[1]
@@ -113,9 +114,11 @@ def load_scen(path: str | Path) -> list[ScenEntry]:
     if lines[0].split() not in (["version", "1"], ["version", "1.0"]):
         raise bad_input(f"{path}:1", shown(lines[0]), "the first line is 'version 1' or 'version 1.0'",
                         f"check that this is {_SCEN}")
-    rows = [(k + 1, _columns(f"{path}:{k + 1}", text)) for k, text in enumerate(lines) if k > 0 and text.strip()]
+    rows = [(line, _columns(f"{path}:{line}", text))
+            for line, text in enumerate(lines[1:], start=2) if text.strip()]
     if not rows:
-        raise bad_input(path, "no scenario", "a line for each scenario follows the version", "fetch the file again")
+        raise bad_input(path, "no scenario", "a line for each scenario follows the version",
+                        "fetch the file again")
     decimals = fixed_decimals([columns[8] for _, columns in rows])
     return [_entry(f"{path}:{line}", line, columns, decimals) for line, columns in rows]
 
@@ -130,9 +133,7 @@ def fixed_decimals(lengths: Sequence[str]) -> int | None:
 
 
 def length_tolerance(length: float, decimals: int | None) -> float:
-    """Half a unit of the last digit printed (of the sixth significant one where `decimals` is None), plus
-    1e-5.
-    """
+    """Half a unit of the last digit, the sixth significant one if `decimals` is None, plus 1e-5."""
     if decimals is None:
         decimals = SIGNIFICANT_DIGITS - 1 - (math.floor(math.log10(length)) if length > 0.0 else 0)
     return 0.5 * 10.0 ** -decimals + LENGTH_SLACK
@@ -142,8 +143,9 @@ def _columns(where: str, text: str) -> list[str]:
     text = text.strip()
     columns = [column.strip() for column in text.split("\t")] if "\t" in text else text.split()
     if len(columns) != 9:
-        raise bad_input(where, f"{len(columns)} columns", "an entry has 9: bucket, map, width, height, start x, start y, "
-                        "goal x, goal y, length", "separate them by tabs, or by spaces throughout")
+        raise bad_input(where, f"{len(columns)} columns, not 9",
+                        "an entry is: bucket map width height start_x start_y goal_x goal_y optimal_length",
+                        "separate them by tabs, or by spaces throughout")
     return columns
 
 
@@ -178,5 +180,6 @@ def _length(where: str, text: str) -> float:
     except ValueError:
         length = math.nan
     if not (math.isfinite(length) and length >= 0.0):
-        raise bad_input(where, f"length {shown(text)}", "must be a finite number, at least 0", "mend the number")
+        raise bad_input(where, f"length {shown(text)}", "must be a finite number, at least 0",
+                        "mend the number")
     return length

@@ -1,12 +1,13 @@
-"""Reading a user's files, and refusing what cannot be read in one line that says where, what, why and what
-to do.
-"""
+"""Reading a user's files, and refusing bad ones in one line: where, what was found, the rule, the remedy."""
 
 import math
 from pathlib import Path
 from typing import Any
 
 from scenarios.errors import InputError
+
+# Beyond these a length would be infinite or zero in float32.
+LARGEST, SMALLEST = 1e30, 1e-30
 
 
 def bad_input(where: object, found: str, rule: str, remedy: str) -> InputError:
@@ -31,7 +32,7 @@ def read_bytes(path: str | Path, kind: str) -> bytes:
     try:
         content = path.read_bytes()
     except FileNotFoundError:
-        raise bad_input(path, "no such file", f"{kind} was expected here", "check the name and folder") from None
+        raise bad_input(path, "no such file", f"{kind} is expected", "check the name and folder") from None
     except (OSError, ValueError) as error:
         raise bad_input(path, f"cannot be read ({error})", f"{kind} must be readable",
                         "check the file and its permissions") from None
@@ -41,10 +42,10 @@ def read_bytes(path: str | Path, kind: str) -> bytes:
 
 
 def read_lines(path: str | Path, kind: str) -> list[str]:
-    """The lines of a text file without their ends; LF and CRLF, a missing last newline and a UTF-8 mark are
-    accepted.
+    """The lines of a text file without their ends.
 
-    Raises InputError as `read_bytes` does, and for content that is not text.
+    LF and CRLF, a missing last newline and a UTF-8 mark are accepted. Raises InputError as `read_bytes` does,
+    and for content that is not text.
     """
     content = read_bytes(path, kind)
     try:
@@ -57,26 +58,24 @@ def read_lines(path: str | Path, kind: str) -> list[str]:
         raise bad_input(path, f"byte {place} is not text", f"{kind} is a text file",
                         "check that this is the right file, uncompressed")
     lines = [line.removesuffix("\r") for line in text.split("\n")]
-    return lines[:-1] if lines[-1] == "" else lines
+    return lines[:-1] if len(lines) > 1 and lines[-1] == "" else lines
 
 
 def number(where: object, value: Any, rule: str, remedy: str) -> float:
-    """A finite number from a number or its text; anything else, booleans too, is refused with `rule` and
-    `remedy`.
-    """
+    """A finite number from a number or its text; all else, booleans too, is an InputError of these parts."""
     try:
         result = math.nan if isinstance(value, bool) else float(value)
     except (TypeError, ValueError, OverflowError):
         result = math.nan
-    if not math.isfinite(result):
+    if not abs(result) <= LARGEST:
         raise bad_input(where, shown(value), rule, remedy)
     return result
 
 
 def positive_number(where: object, value: Any, remedy: str) -> float:
     """A finite number above zero, or an InputError ending in `remedy`."""
-    rule = "must be a finite number above 0"
+    rule = f"must be a finite number above 0, from {SMALLEST} to {LARGEST}"
     result = number(where, value, rule, remedy)
-    if result <= 0.0:
+    if result < SMALLEST:
         raise bad_input(where, shown(value), rule, remedy)
     return result

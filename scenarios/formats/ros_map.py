@@ -46,9 +46,11 @@ def load_ros_map(path: str | Path) -> MapFile:
     """
     metadata = read_metadata(path)
     values = occupancy(read_pixels(metadata.image), metadata)[::-1].copy()
-    least_occupied = max(1.0, 100.0 * metadata.occupied_thresh) if metadata.mode == "raw" else OCCUPIED
-    return MapFile(name=str(path), occupied=values >= least_occupied, unknown=values == UNKNOWN,
-                   resolution=metadata.resolution, origin=metadata.origin, yaw=metadata.yaw, occupancy=values)
+    occupied, unknown = values == OCCUPIED, values == UNKNOWN
+    if metadata.mode == "raw":
+        occupied = ~unknown & (values.astype(np.float64) / OCCUPIED >= metadata.occupied_thresh)
+    return MapFile(name=str(path), occupied=occupied, unknown=unknown, resolution=metadata.resolution,
+                   origin=metadata.origin, yaw=metadata.yaw, occupancy=values)
 
 
 def occupancy(pixels: Pixels, metadata: RosMetadata) -> np.ndarray:
@@ -77,8 +79,7 @@ def occupancy(pixels: Pixels, metadata: RosMetadata) -> np.ndarray:
 
 
 def read_metadata(path: str | Path) -> RosMetadata:
-    """Read and check a map YAML. `mode` may be left out (trinary); the other fields are required, as Nav2
-    requires them.
+    """Read and check a map YAML. `mode` may be left out (trinary); the other fields may not, as in Nav2.
 
     Raises InputError naming the file and the field.
     """
@@ -91,7 +92,8 @@ def read_metadata(path: str | Path) -> RosMetadata:
     occupied_thresh, free_thresh = _thresholds(path, fields)
     return RosMetadata(
         image=_image_path(path, fields["image"]),
-        resolution=positive_number(f"{path}, resolution", fields["resolution"], "give the side of a pixel in metres"),
+        resolution=positive_number(f"{path}, resolution", fields["resolution"],
+                                   "give the side of a pixel in metres"),
         origin=(x, y), yaw=yaw, negate=_negate(path, fields["negate"]), occupied_thresh=occupied_thresh,
         free_thresh=free_thresh, mode=_mode(path, fields.get("mode", "trinary")))
 
@@ -121,12 +123,14 @@ def _image_path(path: str | Path, value: Any) -> Path:
         raise bad_input(where, shown(value), "must be the name of an image file", "name the map's image")
     image = Path(path).parent / value
     if not image.is_file():
-        raise bad_input(where, shown(value), f"there is no file {image}", "put the image there or mend the name")
+        raise bad_input(where, shown(value), f"there is no file {image}",
+                        "put the image there or mend the name")
     return image
 
 
 def _origin(path: str | Path, value: Any) -> tuple[float, float, float]:
-    where, rule, remedy = f"{path}, origin", "must be three finite numbers", "write [x, y, yaw] in metres and radians"
+    where, rule = f"{path}, origin", "must be three finite numbers"
+    remedy = "write [x, y, yaw] in metres and radians"
     if not isinstance(value, list) or len(value) != 3:
         raise bad_input(where, shown(value), rule, remedy)
     x, y, yaw = (number(where, part, rule, remedy) for part in value)
@@ -137,7 +141,7 @@ def _thresholds(path: str | Path, fields: dict[Any, Any]) -> tuple[float, float]
     """(occupied_thresh, free_thresh), both within 0..1 and in order."""
     values: list[float] = []
     for name in ("occupied_thresh", "free_thresh"):
-        rule, remedy = "must be a number from 0 to 1", "Nav2's own maps have occupied_thresh 0.65, free_thresh 0.25"
+        rule, remedy = "must be a number from 0 to 1", "Nav2's defaults are 0.65 (occupied) and 0.25 (free)"
         value = number(f"{path}, {name}", fields[name], rule, remedy)
         if not 0.0 <= value <= 1.0:
             raise bad_input(f"{path}, {name}", shown(value), rule, remedy)
@@ -152,13 +156,15 @@ def _thresholds(path: str | Path, fields: dict[Any, Any]) -> tuple[float, float]
 def _negate(path: str | Path, value: Any) -> bool:
     if isinstance(value, bool | int) and value in (0, 1):
         return bool(value)
-    raise bad_input(f"{path}, negate", shown(value), "must be 0 or 1", "write 1 if white is occupied, otherwise 0")
+    raise bad_input(f"{path}, negate", shown(value), "must be 0 or 1",
+                    "write 1 if white is occupied, otherwise 0")
 
 
 def _mode(path: str | Path, value: Any) -> str:
     mode = value.lower() if isinstance(value, str) else ""
     if mode not in MODES:
-        raise bad_input(f"{path}, mode", shown(value), f"must be one of {', '.join(MODES)}", "mend or drop the line")
+        raise bad_input(f"{path}, mode", shown(value), f"must be one of {', '.join(MODES)}",
+                        "mend or drop the line")
     return mode
 
 

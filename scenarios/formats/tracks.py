@@ -9,16 +9,15 @@ from pathlib import Path
 import numpy as np
 
 from adwa_jax.scenario import Movers
-from scenarios.errors import InputError
 from scenarios.formats.leaves import tracked_movers
 from scenarios.formats.reading import bad_input, positive_number, read_lines, shown
 
 _KIND = "a track file"
 
 
-def load_tracks(path: str | Path, frames_per_second: float = 25.0, largest_gap: float = 3.0) -> list[np.ndarray]:
-    """Read rows `frame id x y` separated by white space; blank lines and lines that begin with `#` are
-    skipped.
+def load_tracks(path: str | Path, frames_per_second: float = 25.0,
+                largest_gap: float = 3.0) -> list[np.ndarray]:
+    """Read rows `frame id x y`, separated by white space; blank lines and `#` lines are skipped.
 
     Returns one array [J, 3] float64 a track, rows t [s] from the file's first frame, x, y [m], t increasing;
     the tracks are in order of id, then time. Where a person is unseen for more than `largest_gap` sample
@@ -39,7 +38,8 @@ def load_tracks(path: str | Path, frames_per_second: float = 25.0, largest_gap: 
     tracks = np.split(np.concatenate([times, rows[:, 2:]], axis=1), cuts)
     tracks = [track for track in tracks if len(track) >= 2]
     if not tracks:
-        raise bad_input(path, "no track of two rows", "a track needs at least two rows of one id", "check the columns")
+        raise bad_input(path, "no track of two rows", "a track needs at least two rows of one id",
+                        "check the columns")
     return tracks
 
 
@@ -60,12 +60,15 @@ def movers_from_tracks(tracks: Sequence[np.ndarray], radius: float) -> Movers:
 
 def _checked(index: int, track: np.ndarray) -> np.ndarray:
     """The track in float32."""
-    where, rule = f"tracks[{index}]", "a track is an array [J, 3] of finite numbers, J at least 2, its times increasing"
-    track = np.asarray(track, np.float32)
+    where = f"tracks[{index}]"
+    rule = "a track is an array [J, 3] of finite numbers, J at least 2, its times increasing"
+    with np.errstate(over="ignore"):  # infinite in float32 is refused below
+        track = np.asarray(track, np.float32)
     if track.ndim != 2 or track.shape[1] != 3 or len(track) < 2:
         raise bad_input(where, f"array of shape {track.shape}", rule, "give rows t, x, y")
     if not np.isfinite(track).all() or (np.diff(track[:, 0]) <= 0.0).any():
-        raise bad_input(where, "a value that is not finite, or a time that does not increase", rule, "mend the rows")
+        raise bad_input(where, "a value that is not finite, or a time that does not increase", rule,
+                        "mend the rows")
     return track
 
 
@@ -83,7 +86,8 @@ def _read_rows(path: str | Path) -> np.ndarray:
                             "one row for each frame and id", "remove one of the two")
         rows.append(row)
     if not rows:
-        raise bad_input(path, "no row", f"{_KIND} holds rows 'frame id x y'", "check that this is such a file")
+        raise bad_input(path, "no row", f"{_KIND} holds rows 'frame id x y'",
+                        "check that this is such a file")
     return np.array(rows)
 
 
@@ -93,9 +97,6 @@ def _row(where: str, text: str) -> list[float]:
     except ValueError:
         row = []
     if len(row) != 4 or not np.isfinite(row).all():
-        raise _bad_row(where, text)
+        raise bad_input(where, shown(text), "a row is four finite numbers: frame id x y",
+                        "mend or remove the line")
     return row
-
-
-def _bad_row(where: str, text: str) -> InputError:
-    return bad_input(where, shown(text), "a row is four finite numbers: frame id x y", "mend or remove the line")

@@ -59,12 +59,12 @@ def movers_of(radius: Sequence[float], position: Sequence[Point], velocity: Sequ
 
 
 def walkers_of(radius: Sequence[float], tracks: Sequence[np.ndarray], period: Sequence[float]) -> Movers:
-    """Movers with tracks, each [J, 3] (t [s], x, y [m]); shorter ones repeat their last row up to the longest.
+    """Movers with tracks, each [J, 3] (t [s], x, y [m]); shorter ones repeat their last row.
 
     Position and box are those of the track, the velocity is that of its first stretch.
     """
     count, longest = len(tracks), max((len(track) for track in tracks), default=0)
-    padded = [np.concatenate([track, np.repeat(track[-1:], longest - len(track), axis=0)]) for track in tracks]
+    padded = [np.pad(track, ((0, longest - len(track)), (0, 0)), mode="edge") for track in tracks]
     velocity = [(track[1, 1:] - track[0, 1:]) / (track[1, 0] - track[0, 0]) for track in tracks]
     first, low, high = ([pick(track[:, 1:]) for track in tracks] for pick in (_first, _lowest, _highest))
     valid: Any = np.ones(count, np.bool_)
@@ -85,11 +85,12 @@ def _highest(points: np.ndarray) -> np.ndarray:
     return points.max(axis=0)
 
 
-def scenario_of(grid: Grid, start: Point, goal: Point, spec: TaskSpec, squares: UnknownSquares, movers: Movers,
-                heading: float | None = None) -> Scenario:
+def scenario_of(grid: Grid, start: Point, goal: Point, spec: TaskSpec, squares: UnknownSquares,
+                movers: Movers, heading: float | None = None) -> Scenario:
     """The episode from start to goal [m].
 
-    heading [rad]: None leaves the robot to face its first key point, and the array holds the bearing of the goal.
+    heading [rad]: None leaves the robot to face its first key point, and the array holds the bearing of the
+    goal.
     """
     bearing = math.atan2(goal[1] - start[1], goal[0] - start[0]) if heading is None else heading
     given: Any = np.asarray(heading is not None, np.bool_)

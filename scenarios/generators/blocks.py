@@ -7,11 +7,10 @@ import jax
 import numpy as np
 
 from adwa_jax.scenario import Scenario
-from scenarios.generators.assembly import centre, grid_of, scenario_of
+from scenarios.generators.assembly import grid_of
 from scenarios.generators.connectivity import Cell, border_cells, carved, inflated, largest_component
 from scenarios.generators.draws import Draws, streams_of
-from scenarios.generators.movers import patrolling_movers
-from scenarios.generators.squares import place_squares
+from scenarios.generators.patrolled import patrolled_scenario
 from scenarios.generators.task_spec import TaskSpec, demand, demand_count, demand_number
 from scenarios.generators.tasks import far_pair
 
@@ -24,7 +23,7 @@ class BlocksSpec(TaskSpec):
     """A `cells` × `cells` map with blocks of 1 … `longest_side` cells a side, which may overlap.
 
     Blocks fall until their share of the map is at least `density`. Start and goal are random cells, at least
-    `separation` times the map's diagonal apart.
+    `separation` times the map's diagonal apart. Cells are `resolution` [m] wide.
     """
 
     cells: int = 32
@@ -43,26 +42,24 @@ class BlocksSpec(TaskSpec):
         demand_number("separation", self.separation, 0.0, 0.5)
         room = self.cells - 2 * border_cells(self.resolution, self.robot_radius)
         demand(2 * room >= self.cells, "robot_radius", self.robot_radius,
-               "the robot must have at least half of the map's side between the borders", "take a smaller radius")
+               "it must have at least half of the map's side between the borders", "take a smaller radius")
 
 
 def generate(key: jax.Array, spec: BlocksSpec) -> Scenario:
-    """One scenario with a solvable known map (corner rule `never`, `spec.robot_radius`), numpy leaves, origin (0, 0).
+    """One scenario with a known map that a robot of `spec.robot_radius` can solve; numpy leaves, origin (0, 0).
 
-    The unknown squares leave the map solvable too. Movers patrol free lanes. Consumes the key: map, task, squares and
-    movers take a stream each.
+    The unknown squares leave the map solvable too. Movers patrol free lanes. Consumes the key: map, task,
+    squares and movers take a stream each.
     """
     streams = streams_of(key)
     occupied, start, goal = _draw_task(streams.map, streams.task, spec)
     blocked = inflated(occupied, spec.resolution, spec.robot_radius)
-    squares = place_squares(streams.squares, occupied, blocked, start, goal, spec, spec.resolution)
-    movers = patrolling_movers(streams.movers, occupied, start, goal, spec, spec.resolution)
-    ends = centre(start, spec.resolution), centre(goal, spec.resolution)
-    return scenario_of(grid_of(occupied, spec.resolution), *ends, spec, squares, movers)
+    grid = grid_of(occupied, spec.resolution)
+    return patrolled_scenario(streams, grid, blocked, start, goal, spec, spec.resolution)
 
 
 def _draw_task(draws: Draws, task: Draws, spec: BlocksSpec) -> tuple[np.ndarray, Cell, Cell]:
-    """A map with start and goal; the pair is taken from the largest component, so dense maps may need several tries."""
+    """A map with start and goal in its largest component; dense maps may need several tries."""
     least = spec.separation * math.sqrt(2) * spec.cells
     occupied = np.zeros((spec.cells, spec.cells), np.bool_)
     for _ in range(MAP_TRIES):
@@ -73,7 +70,8 @@ def _draw_task(draws: Draws, task: Draws, spec: BlocksSpec) -> tuple[np.ndarray,
             if math.dist(start, goal) >= least:
                 return occupied, start, goal
     first = border_cells(spec.resolution, spec.robot_radius)
-    start, goal = (first, first), (spec.cells - 1 - first,) * 2
+    last = spec.cells - 1 - first
+    start, goal = (first, first), (last, last)
     return carved(draws, occupied, start, goal, spec.resolution, spec.robot_radius), start, goal
 
 

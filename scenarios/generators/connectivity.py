@@ -1,9 +1,10 @@
 """Which cells of a map a robot can reach, and a corridor for maps in which it can reach none.
 
-A cell is blocked when the robot, centred on it, would touch an occupied square (`adwa_jax.grid.inflate`). Under the
-corner rule `never` a diagonal step needs both orthogonal neighbours free, so two cells are connected iff they are
-4-connected. All of this runs on the host in numpy: maps are drawn one at a time, before anything is compiled.
-Dimension letters: H, W rows and columns of the map; N offsets; E edges between runs.
+A cell is blocked when the robot, centred on it, would touch an occupied square (`adwa_jax.grid.inflate`).
+Under the corner rule `never` a diagonal step needs both orthogonal neighbours free, so two cells are
+connected iff they are 4-connected. All of this runs on the host in numpy: maps are drawn one at a time,
+before anything is compiled. Dimension letters: H, W rows and columns of the map; N offsets; E edges between
+runs.
 """
 
 import numpy as np
@@ -15,7 +16,7 @@ Cell = tuple[int, int]
 
 
 def inflated(occupied: np.ndarray, resolution: float, radius: float) -> np.ndarray:
-    """[H, W] bool: cells in which a disc of `radius` [m] centred on the cell meets an occupied square or the border.
+    """[H, W] bool: cells in which a disc of `radius` [m] centred on the cell meets an obstacle or the border.
 
     Equal to `adwa_jax.grid.inflate`, ties included, without a compilation for every size of map.
     """
@@ -31,8 +32,8 @@ def inflated(occupied: np.ndarray, resolution: float, radius: float) -> np.ndarr
 def footprint(resolution: float, radius: float, half_width: float = 0.0) -> np.ndarray:
     """[N, 2] int (row, column) offsets from a square to the cells it blocks for a disc of `radius` [m].
 
-    The square is centred on a cell and reaches `half_width` [m] to each side; every cell that it overlaps counts as
-    occupied as a whole. `half_width` 0: the square is the one cell.
+    The square is centred on a cell and reaches `half_width` [m] to each side; every cell that it overlaps
+    counts as occupied as a whole. `half_width` 0: the square is the one cell.
     """
     covered = int(np.ceil(half_width / resolution - 0.5)) if half_width > 0.5 * resolution else 0
     reach = covered + _reach(resolution, radius)
@@ -44,10 +45,10 @@ def footprint(resolution: float, radius: float, half_width: float = 0.0) -> np.n
 
 
 def components(free: np.ndarray) -> np.ndarray:
-    """[H, W] int32: a label for each 4-connected component of free cells, the same in all its cells; -1 if not free.
+    """[H, W] int32: one label for all cells of a 4-connected component of free cells; -1 elsewhere.
 
-    Runs of free cells along a row are the nodes of a graph, joined where they touch; each run takes the least number
-    among the runs that it is joined to, until nothing changes.
+    Runs of free cells along a row are the nodes of a graph, joined where they touch; each run takes the least
+    number among the runs that it is joined to, until nothing changes.
     """
     begins = free.copy()
     begins[:, 1:] &= ~free[:, :-1]
@@ -90,17 +91,18 @@ def _reach(resolution: float, radius: float) -> int:
 
 
 def largest_component(blocked: np.ndarray) -> np.ndarray:
-    """[N, 2] int (row, column) of the cells of the largest component of unblocked cells; N = 0 if all are blocked."""
+    """[N, 2] int (row, column): the largest component of unblocked cells; N = 0 if all are blocked."""
     label = components(~blocked)
     sizes = np.bincount(label[label >= 0], minlength=1)
     return np.argwhere(label == sizes.argmax())
 
 
-def carved(draws: Draws, occupied: np.ndarray, a: Cell, b: Cell, resolution: float, radius: float) -> np.ndarray:
+def carved(draws: Draws, occupied: np.ndarray, a: Cell, b: Cell, resolution: float,
+           radius: float) -> np.ndarray:
     """A copy of the map in which a random staircase from cell a to cell b is free for a disc of `radius` [m].
 
-    Cells a and b must be far enough from the border for the disc. The staircase's steps, all towards b, come in random
-    order, which `draws` decides.
+    Cells a and b must be far enough from the border for the disc. The staircase's steps, all towards b, come
+    in random order, which `draws` decides.
     """
     down, right = abs(b[0] - a[0]), abs(b[1] - a[1])
     is_down = draws.order(down + right) < down

@@ -1,8 +1,8 @@
 """Random numbers for the generators, drawn on the host from one jax key.
 
-A key becomes independent streams, one a purpose, so that changing the number of movers leaves the map as it was. Every
-number is made from 53-bit uniforms by multiplication, comparison and sorting, which no version of numpy or processor
-does differently.
+A key becomes independent streams, one a purpose, so that changing the number of movers leaves the map as it
+was. Every number is made from 53-bit uniforms by multiplication, comparison and sorting, which no version of
+numpy or processor does differently.
 """
 
 from typing import NamedTuple

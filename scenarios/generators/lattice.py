@@ -17,20 +17,20 @@ def lattice_cells(rooms: int, room_cells: int) -> int:
 
 
 def draw_lattice(draws: Draws, rooms: int, room_cells: int, opening_cells: int, extra: float) -> np.ndarray:
-    """[H, W] bool: rooms × rooms rooms of room_cells² cells, each wall with at most one opening of opening_cells.
+    """[H, W] bool: rooms² rooms of room_cells² cells, each wall with at most one opening of opening_cells.
 
-    A random spanning tree of openings connects all rooms; each further wall has an opening with probability `extra`.
-    Where in its wall an opening lies is random. Consumes `draws`.
+    A random spanning tree of openings connects all rooms; each further wall has an opening with probability
+    `extra`. Where in its wall an opening lies is random. Consumes `draws`.
     """
     pitch, side = room_cells + WALL_CELLS, lattice_cells(rooms, room_cells)
     occupied = np.zeros((side, side), np.bool_)
     for line in range(room_cells, side, pitch):
         occupied[line : line + WALL_CELLS] = occupied[:, line : line + WALL_CELLS] = True
     for row, column, is_up in _openings(draws, rooms, extra):
-        offset = draws.index(room_cells - opening_cells + 1)
-        along = slice((column if is_up else row) * pitch + offset, (column if is_up else row) * pitch + offset + opening_cells)
-        wall = (row if is_up else column) * pitch + room_cells
-        through = slice(wall, wall + WALL_CELLS)
+        across, beside = (row, column) if is_up else (column, row)
+        first = beside * pitch + draws.index(room_cells - opening_cells + 1)
+        wall = across * pitch + room_cells
+        through, along = slice(wall, wall + WALL_CELLS), slice(first, first + opening_cells)
         occupied[(through, along) if is_up else (along, through)] = False
     return occupied
 

@@ -1,28 +1,24 @@
 """Mazes: corridors along a random spanning tree."""
 
-import math
 from dataclasses import dataclass
 
 import jax
 
 from adwa_jax.scenario import Scenario
-from scenarios.generators.assembly import centre, grid_of, scenario_of
-from scenarios.generators.connectivity import inflated, largest_component
 from scenarios.generators.draws import streams_of
 from scenarios.generators.lattice import draw_lattice
-from scenarios.generators.movers import patrolling_movers
-from scenarios.generators.squares import place_squares
+from scenarios.generators.patrolled import scenario_between_rooms
 from scenarios.generators.task_spec import TaskSpec, demand_count, demand_fit, demand_number
-from scenarios.generators.tasks import far_pair
 
 
 @dataclass(frozen=True, kw_only=True)
 class MazeSpec(TaskSpec):
     """`junctions` × `junctions` places joined by corridors of `corridor_cells`, walls a cell thick.
 
-    `extra_openings` 0 gives a perfect maze (one way between any two places); otherwise each remaining wall is opened with
-    that probability. Start and goal are random cells, at least `separation` times the map's diagonal apart. The map is
-    junctions · (corridor_cells + 1) - 1 cells a side.
+    `extra_openings` 0 gives a perfect maze (one way between any two places); otherwise each remaining wall is
+    opened with that probability. Start and goal are random cells, at least `separation` times the map's
+    diagonal apart. The map is junctions · (corridor_cells + 1) - 1 cells a side; its cells are `resolution`
+    [m] wide.
     """
 
     junctions: int = 11
@@ -44,17 +40,12 @@ class MazeSpec(TaskSpec):
 
 
 def generate(key: jax.Array, spec: MazeSpec) -> Scenario:
-    """One scenario with a solvable known map (corner rule `never`, `spec.robot_radius`), numpy leaves, origin (0, 0).
+    """One scenario with a known map that a robot of `spec.robot_radius` can solve; numpy leaves, origin (0, 0).
 
-    The unknown squares leave the map solvable too. Movers patrol one lane of a corridor. Consumes the key: map, task,
-    squares and movers take a stream each.
+    The unknown squares leave the map solvable too. Movers patrol one lane of a corridor. Consumes the key:
+    map, task, squares and movers take a stream each.
     """
     streams = streams_of(key)
-    occupied = draw_lattice(streams.map, spec.junctions, spec.corridor_cells, spec.corridor_cells, spec.extra_openings)
-    blocked = inflated(occupied, spec.resolution, spec.robot_radius)
-    least = spec.separation * math.hypot(*occupied.shape)
-    start, goal = far_pair(streams.task, largest_component(blocked), least)
-    squares = place_squares(streams.squares, occupied, blocked, start, goal, spec, spec.resolution)
-    movers = patrolling_movers(streams.movers, occupied, start, goal, spec, spec.resolution)
-    ends = centre(start, spec.resolution), centre(goal, spec.resolution)
-    return scenario_of(grid_of(occupied, spec.resolution), *ends, spec, squares, movers)
+    corridor = spec.corridor_cells
+    occupied = draw_lattice(streams.map, spec.junctions, corridor, corridor, spec.extra_openings)
+    return scenario_between_rooms(streams, occupied, spec, spec.resolution, spec.separation)

@@ -20,29 +20,33 @@ def crossing_movers(draws: Draws, occupied: np.ndarray, start: Cell, goal: Cell,
                     resolution: float) -> Movers:
     """Up to `spec.mover_count` movers on straight lines, mirrored where the disc meets the map's border.
 
-    They start within free cells farther than `spec.mover_distance` from start and goal, pass through known obstacles,
-    and keep a speed and a heading drawn from `spec.mover_speed` and the full circle. Consumes `draws`.
+    They start within free cells farther than `spec.mover_distance` from start and goal, pass through known
+    obstacles, and keep a speed and a heading drawn from `spec.mover_speed` and the full circle. Consumes
+    `draws`.
 
     occupied: [H, W] bool; the map's origin is (0, 0).
     """
     size = np.array(occupied.shape[::-1]) * resolution
-    cells = _far_cells(occupied, start, goal, spec, resolution, slack=math.sqrt(0.5) * resolution + spec.mover_radius[1])
+    slack = math.sqrt(0.5) * resolution + math.sqrt(2.0) * spec.mover_radius[1]  # to the cell's side, off the border
+    cells = _far_cells(occupied, start, goal, spec, resolution, slack)
     movers = []
     for _ in range(spec.mover_count if len(cells) else 0):
-        radius, speed, angle = draws.uniform(*spec.mover_radius), draws.uniform(*spec.mover_speed), draws.uniform(0, 1)
+        radius, speed = draws.uniform(*spec.mover_radius), draws.uniform(*spec.mover_speed)
+        heading = draws.uniform(0.0, 2.0 * math.pi)
         inside = (cells[draws.index(len(cells))][::-1] + draws.uniforms(2)) * resolution
         low, high = np.full(2, radius), size - radius
-        velocity = speed * np.array([math.cos(2 * math.pi * angle), math.sin(2 * math.pi * angle)])
+        velocity = speed * np.array([math.cos(heading), math.sin(heading)])
         movers.append((radius, np.clip(inside, low, high), velocity, low, high))
     return _collected(movers)
 
 
-def patrolling_movers(draws: Draws, occupied: np.ndarray, start: Cell, goal: Cell, spec: TaskSpec, resolution: float,
-                      origin: Point = (0.0, 0.0)) -> Movers:
+def patrolling_movers(draws: Draws, occupied: np.ndarray, start: Cell, goal: Cell, spec: TaskSpec,
+                      resolution: float, origin: Point = (0.0, 0.0)) -> Movers:
     """Up to `spec.mover_count` movers that go to and fro along straight lanes of the known map.
 
-    A lane is a run of cells, along x or y, in each of which the largest mover touches no occupied square; a mover keeps
-    to the cells' centres. They start farther than `spec.mover_distance` from start and goal. Consumes `draws`.
+    A lane is a run of cells, along x or y, in each of which the largest mover touches no occupied square; a
+    mover keeps to the cells' centres. They start farther than `spec.mover_distance` from start and goal.
+    Consumes `draws`.
 
     occupied: [H, W] bool; origin: the outer corner of cell (0, 0) [m].
     """
@@ -69,7 +73,7 @@ def _collected(movers: list[tuple]) -> Movers:
 
 def _far_cells(closed: np.ndarray, start: Cell, goal: Cell, spec: TaskSpec, resolution: float,
                slack: float) -> np.ndarray:
-    """[N, 2] int (row, column): open cells whose centres are farther than the mover distance + slack from both ends."""
+    """[N, 2] int (row, column): open cells, farther than the mover distance + slack from start and goal."""
     cells = np.argwhere(~closed)
     least = (spec.mover_distance + slack) / resolution
     away = [np.sum((cells - end) ** 2, axis=1) > least * least for end in (start, goal)]
@@ -80,7 +84,8 @@ def _lane(closed: np.ndarray, cell: np.ndarray, along_x: int, resolution: float,
           origin: Point) -> tuple[np.ndarray, np.ndarray]:
     """Low and high corner (x, y) [m] of the box of the mover's centre in the lane through a cell.
 
-    Along the lane from centre to centre of its last cells; across it a cell wide, so that no side is of length 0.
+    Along the lane from centre to centre of its last cells; across it a cell wide, so that no side is of
+    length 0.
     """
     row, column = cell
     line, here = (closed[row], column) if along_x else (closed[:, column], row)

@@ -1,4 +1,5 @@
-"""The maps of the paper's simulations (§5): square, start upper left, goal lower right, obstacles cell by cell."""
+"""The maps of the paper's simulations (§5): square, start upper left, goal lower right, obstacles cell by
+cell."""
 
 from dataclasses import dataclass
 
@@ -21,11 +22,12 @@ MAP_TRIES = 16
 
 @dataclass(frozen=True, kw_only=True)
 class PaperSpec(TaskSpec):
-    """A `cells` × `cells` map of 1 m cells, each an obstacle with probability `density` (start and goal never).
+    """A `cells` × `cells` map of 1 m cells, each an obstacle with probability `density` (start and goal
+    never).
 
-    The paper prints maps of 15, 20 and 25 cells but neither density nor counts of obstacles: those are our choice.
-    `movers` None: 8 on 25 × 25 cells and in proportion to the area (3 on 15², 5 on 20²).
-    `time_limit` serves up to 25 cells a side; larger maps want about 2.4 s a cell of the side.
+    The paper prints maps of 15, 20 and 25 cells but neither density nor counts of obstacles: those are our
+    choice. `movers` None: 8 on 25 × 25 cells and in proportion to the area (3 on 15², 5 on 20²). `time_limit`
+    serves up to 25 cells a side; larger maps want about 2.4 s a cell of the side.
     """
 
     cells: int = 25
@@ -37,7 +39,9 @@ class PaperSpec(TaskSpec):
         super().__post_init__()
         demand_number("density", self.density, 0.0, 0.9)
         demand(self.robot_radius < RESOLUTION / 2, "robot_radius", self.robot_radius,
-               "the robot must fit into the corner cell, half of 1 m wide to each side", "take less than 0.5 m")
+               "the robot must fit into a cell, half of 1 m to each side", "take less than 0.5 m")
+        demand(self.mover_radius[1] <= self.cells / 4, "mover_radius", self.mover_radius,
+               "a mover must be at most half as wide as the map", "take a smaller radius or more cells")
 
     @property
     def mover_count(self) -> int:
@@ -46,10 +50,10 @@ class PaperSpec(TaskSpec):
 
 
 def generate(key: jax.Array, spec: PaperSpec) -> Scenario:
-    """One scenario with a solvable known map (corner rule `never`, `spec.robot_radius`), numpy leaves, origin (0, 0).
+    """One scenario with a known map that a robot of `spec.robot_radius` can solve; numpy leaves, origin (0, 0).
 
-    The unknown squares leave the map solvable too. Movers cross the whole map in straight lines, mirrored at its border.
-    Consumes the key: map, squares and movers take a stream each, so none changes another.
+    The unknown squares leave the map solvable too. Movers cross the whole map in straight lines, mirrored at
+    its border. Consumes the key: map, squares and movers take a stream each, so none changes another.
     """
     streams = streams_of(key)
     start, goal = (spec.cells - 1, 0), (0, spec.cells - 1)
@@ -61,7 +65,8 @@ def generate(key: jax.Array, spec: PaperSpec) -> Scenario:
 
 
 def _draw_map(draws: Draws, spec: PaperSpec, start: tuple[int, int], goal: tuple[int, int]) -> np.ndarray:
-    """[H, W] bool, start and goal connected; the robot fits into every free cell, for a cell is wider than it."""
+    """[H, W] bool, start and goal connected; the robot fits into every free cell, for a cell is wider than
+    it."""
     occupied = np.zeros((spec.cells, spec.cells), np.bool_)
     for _ in range(MAP_TRIES):
         occupied = draws.uniforms(spec.cells, spec.cells) < spec.density

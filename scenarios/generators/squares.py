@@ -12,14 +12,15 @@ TRIES_PER_SQUARE = 8
 """Cells looked at for each square before the map counts as full."""
 
 
-def place_squares(draws: Draws, occupied: np.ndarray, blocked: np.ndarray, start: Cell, goal: Cell, spec: TaskSpec,
-                  resolution: float, origin: Point = (0.0, 0.0)) -> UnknownSquares:
+def place_squares(draws: Draws, occupied: np.ndarray, blocked: np.ndarray, start: Cell, goal: Cell,
+                  spec: TaskSpec, resolution: float, origin: Point = (0.0, 0.0)) -> UnknownSquares:
     """Up to `spec.squares` unknown squares, each centred on a free cell of its own.
 
-    With every cell that a square overlaps taken as occupied, start and goal stay connected for the robot. No centre
-    lies within `spec.square_distance` of start or goal, along both x and y. Consumes `draws`.
+    With every cell that a square overlaps taken as occupied, start and goal stay connected for the robot. No
+    centre lies within `spec.square_distance` of start or goal, along both x and y. Consumes `draws`.
 
-    occupied, blocked: [H, W] bool, the known map and the cells that it denies the robot; start and goal are connected.
+    occupied, blocked: [H, W] bool, the known map and the cells that it denies the robot; start and goal are
+    connected.
     """
     free = np.flatnonzero(_allowed(occupied, start, goal, spec.square_distance / resolution))
     shape = footprint(resolution, spec.robot_radius, spec.square_half_width)
@@ -52,11 +53,12 @@ def _with_square(blocked: np.ndarray, cell: Cell, shape: np.ndarray) -> np.ndarr
     return with_square
 
 
-def _keeps_joined(before: np.ndarray, after: np.ndarray, cell: Cell, shape: np.ndarray, start: Cell, goal: Cell) -> bool:
+def _keeps_joined(before: np.ndarray, after: np.ndarray, cell: Cell, shape: np.ndarray, start: Cell,
+                  goal: Cell) -> bool:
     """Whether start and goal, connected before the square, are connected after it.
 
-    They are if the cells around the square are connected with each other near by, for a path through the square can
-    then go round it: on large maps that saves looking at the whole map.
+    They are if the cells around the square are connected with each other near by, for a path through the
+    square can then go round it: on large maps that saves looking at the whole map.
     """
     reach = 2 * int(shape.max()) + 2
     near = tuple(slice(max(0, index - reach), index + reach + 1) for index in cell)

@@ -1,4 +1,5 @@
-"""What every generator's spec has in common: the robot, the task, and what the robot does not know beforehand."""
+"""What every generator's spec has in common: the robot, the task, and what the robot does not know
+beforehand."""
 
 import math
 from dataclasses import dataclass
@@ -15,8 +16,9 @@ def demand(holds: bool, field: str, value: object, rule: str, remedy: str) -> No
 
 def demand_number(field: str, value: float, low: float, high: float = math.inf) -> None:
     """Raises ValueError unless the value is finite and in [low, high]."""
-    rule = f"must be a finite number from {low:g}" + (f" to {high:g}" if math.isfinite(high) else " up")
-    demand(math.isfinite(value) and low <= value <= high, field, value, rule, f"try {_nearest(value, low, high)}")
+    remedy = f"try {min(max(value, low), high) if math.isfinite(value) else low:g}"
+    holds = math.isfinite(value) and low <= value <= high
+    demand(holds, field, value, f"must be a finite number {_between(low, high)}", remedy)
 
 
 def demand_count(field: str, value: int, low: int, high: int = 10_000) -> None:
@@ -28,20 +30,20 @@ def demand_count(field: str, value: int, low: int, high: int = 10_000) -> None:
 def demand_range(field: str, value: Range, low: float, high: float = math.inf) -> None:
     """Raises ValueError unless value is (least, greatest) with low ≤ least ≤ greatest ≤ high, all finite."""
     ordered = len(value) == 2 and all(map(math.isfinite, value)) and low <= value[0] <= value[1] <= high
-    rule = f"must be (least, greatest), finite, from {low:g}" + (f" to {high:g}" if math.isfinite(high) else " up")
+    rule = f"must be (least, greatest), both finite and {_between(low, high)}"
     demand(ordered, field, value, rule, "give two numbers in rising order")
 
 
-def _nearest(value: float, low: float, high: float) -> str:
-    return f"{min(max(value, low), high):g}" if math.isfinite(value) else f"{low:g}"
+def _between(low: float, high: float) -> str:
+    return f"from {low:g} to {high:g}" if math.isfinite(high) else f"from {low:g} up"
 
 
 @dataclass(frozen=True, kw_only=True)
 class TaskSpec:
     """Static numbers shared by the generators; lengths in metres, times in seconds.
 
-    `squares` and `movers` are upper counts: where a map has no room for more under the rules below, it gets fewer.
-    Raises ValueError (field, value, rule, remedy) for nonsense.
+    `squares` and `movers` are upper counts: where a map has no room for more under the rules below, it gets
+    fewer. Raises ValueError (field, value, rule, remedy) for nonsense.
     """
 
     robot_radius: float = 0.25  # start and goal are connected for a disc of this radius
@@ -74,8 +76,9 @@ class TaskSpec:
 
 
 def demand_fit(field: str, opening_cells: int, resolution: float, robot_radius: float) -> None:
-    """Raises ValueError unless a robot centred on the middle cell of an opening touches neither side of it."""
+    """Raises ValueError unless a robot centred on the middle cell of an opening touches neither side of
+    it."""
     room = ((opening_cells + 1) // 2 - 0.5) * resolution
     demand(room > robot_radius, field, opening_cells,
-           f"the middle cell of an opening must be farther than robot_radius {robot_radius:g} m from its sides, "
-           f"and is {room:g} m from them", "widen it, enlarge resolution or take a smaller robot_radius")
+           f"its middle cell must be farther than robot_radius {robot_radius:g} m from its sides and is {room:g} m "
+           "from them", "widen it, enlarge resolution or take a smaller robot_radius")

@@ -56,6 +56,8 @@ def wrap(angle):
 def samples(now, reach, least, most, count):
     """Eq. 6 along one axis: [now ± reach] ∩ [least, most], evenly sampled, endpoints included (count ≥ 2)."""
     low, high = max(least, now - reach), min(most, now + reach)
+    if low > high:  # beyond the limits: the one reachable value nearest to them
+        low = high = now - reach if now > most else now + reach
     return [low + i * (high - low) / (count - 1) for i in range(count)]
 
 
@@ -93,14 +95,16 @@ def rollout_clearance(poses, dt, radius, static_distance, squares, movers):
 
 
 def heading_term(pose, target):
-    """π − |angle between the end heading and the bearing from the end to the target|; in [0, π]."""
+    """π − |angle between the end heading and the bearing from the end to the target|; π on the target."""
+    if (pose[0], pose[1]) == (target[0], target[1]):
+        return math.pi
     bearing = math.atan2(target[1] - pose[1], target[0] - pose[0])
     return math.pi - abs(wrap(bearing - pose[2]))
 
 
 def is_admissible(v, yaw_rate, clearance, robot):
-    """Clear, and able to stop and to stop turning within the clearance."""
-    return (clearance > 0 and v <= math.sqrt(2 * clearance * robot.brake)
+    """Clear, and able to stop and to stop turning within the clearance; in reverse as well as forwards."""
+    return (clearance > 0 and abs(v) <= math.sqrt(2 * clearance * robot.brake)
             and abs(yaw_rate) <= math.sqrt(2 * clearance * robot.yaw_brake))
 
 
@@ -113,13 +117,13 @@ def normalised(values, admissible, rule, scale):
         offset, divisor = 0.0, sum(kept)
     else:
         offset, divisor = min(kept), max(kept) - min(kept)
-    return [(value - offset) / divisor if divisor > 0 else 0.0 for value in values]
+    return [(value - offset) / divisor if divisor else 0.0 for value in values]
 
 
 def brake(v_samples, yaw_samples, pose, local_target, dt):
-    """The least speed of the window, clipped at zero, turning to the local target as the window allows."""
+    """The speed of the window nearest to zero, turning to the local target as the window allows."""
     wanted = wrap(math.atan2(local_target[1] - pose[1], local_target[0] - pose[0]) - pose[2]) / dt
-    return max(v_samples[0], 0.0), min(max(wanted, yaw_samples[0]), yaw_samples[-1])
+    return min(max(0.0, v_samples[0]), v_samples[-1]), min(max(wanted, yaw_samples[0]), yaw_samples[-1])
 
 
 def decide(pose, v, yaw_rate, local_target, goal, robot, weights, *, static_distance, squares=(), movers=(),

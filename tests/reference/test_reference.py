@@ -168,6 +168,7 @@ class TestDwa:
     def test_window_is_cut_by_the_limits(self):
         assert dwa.samples(0.25, 0.5, 0.0, 1.0, 4) == [0.0, 0.25, 0.5, 0.75]
         assert dwa.samples(0.9, 0.5, 0.0, 1.0, 2) == [0.4, 1.0]
+        assert dwa.samples(2.0, 0.5, 0.0, 1.0, 2) == [1.5, 1.5]
 
     def test_euler_turns_after_it_moves(self):
         poses = dwa.rollout((0.0, 0.0, 0.0), 2.0, math.pi, 0.5, 2)
@@ -186,11 +187,13 @@ class TestDwa:
         assert not dwa.is_admissible(1.0, 1.0, 0.49, ROBOT)
         assert dwa.is_admissible(0.1, 1.0, 0.25, ROBOT)  # √(2 · 0.25 · 2) = 1
         assert not dwa.is_admissible(0.1, 1.0, 0.24, ROBOT)
+        assert not dwa.is_admissible(-1.0, 0.0, 0.49, ROBOT)
         assert not dwa.is_admissible(0.0, 0.0, 0.0, ROBOT)
 
     def test_heading_term_is_pi_ahead_and_zero_behind(self):
         assert dwa.heading_term((1.0, 1.0, 0.0), (3.0, 1.0)) == math.pi
         assert dwa.heading_term((1.0, 1.0, 7 * math.pi), (3.0, 1.0)) == pytest.approx(0.0)
+        assert dwa.heading_term((1.0, 1.0, 2.0), (1.0, 1.0)) == math.pi
         assert dwa.heading_term((1.0, 1.0, 0.0), (1.0, 2.0)) == pytest.approx(math.pi / 2)
 
     def test_normalisations(self):

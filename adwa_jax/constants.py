@@ -1,0 +1,82 @@
+"""Everything that sets the planner: traced constants on one side, static options on the other."""
+
+from dataclasses import dataclass, field
+from functools import partial
+
+import jax
+
+from adwa_jax.astar import SearchOptions
+from adwa_jax.checks import require, require_choice, require_numbers, require_whole
+from adwa_jax.dwa import DwaOptions
+from adwa_jax.heuristic_weight import Scope, WeightRule
+from adwa_jax.keypoints import KeyPointRule
+from adwa_jax.score import ScoreWeights
+from adwa_jax.window import RobotLimits
+
+
+@partial(
+    jax.tree_util.register_dataclass,
+    data_fields=["dt", "clearance_cap", "clearance_margin", "keypoint_tolerance", "sensor_range", "danger_clearance",
+                 "stuck_radius", "stuck_time"],
+    meta_fields=[],
+)
+@dataclass(frozen=True)
+class Behaviour:
+    """Distances and times of the closed loop (§4). Traced."""
+
+    dt: jax.Array | float  # control step [s]
+    clearance_cap: jax.Array | float  # the clearance term grows no further [m]
+    clearance_margin: jax.Array | float  # key-point segments keep more than this from occupied squares [m]
+    keypoint_tolerance: jax.Array | float  # a key point counts as reached within this distance [m]
+    sensor_range: jax.Array | float  # to an obstacle's outline [m]
+    danger_clearance: jax.Array | float  # closer than this is a danger point of the driven path [m]
+    stuck_radius: jax.Array | float  # STUCK: not out of this circle [m] ...
+    stuck_time: jax.Array | float  # ... for so long [s]
+
+    def __post_init__(self) -> None:
+        """Refuse negative distances and a step that is not positive; traced values pass unseen."""
+        if require_numbers(self, least=0.0):
+            for name in ("dt", "clearance_cap"):
+                value = float(getattr(self, name))
+                require(value > 0, name, value, "must be positive", "raise it")
+
+
+@partial(jax.tree_util.register_dataclass, data_fields=["weight_rule", "weights", "robot", "behaviour"], meta_fields=[])
+@dataclass(frozen=True)
+class Constants:
+    """All that may be tuned without compiling anew."""
+
+    weight_rule: WeightRule  # eq. 5
+    weights: ScoreWeights  # eq. 9
+    robot: RobotLimits  # eq. 6
+    behaviour: Behaviour
+
+
+@dataclass(frozen=True)
+class PlanOptions:
+    """Static choices of the global plan (§2)."""
+
+    search: SearchOptions = SearchOptions()
+    scope: Scope = "node"
+    keypoint_rule: KeyPointRule = "anchor"
+    inflate: bool = True  # block cells whose centre is within the robot's radius of an occupied square
+    subdivision: int = 4  # lattice steps a cell of the distance field
+
+    def __post_init__(self) -> None:
+        """Refuse unknown choices."""
+        require_choice("scope", self.scope, ("start", "node", "one"))
+        require_choice("keypoint_rule", self.keypoint_rule, ("anchor", "literal"))
+        require_whole("subdivision", self.subdivision, 1)
+
+
+@dataclass(frozen=True)
+class Options:
+    """All static choices. Another value compiles anew."""
+
+    plan: PlanOptions = field(default_factory=PlanOptions)
+    dwa: DwaOptions = field(default_factory=DwaOptions)
+    contact_reach: int = 2  # cells around the robot in which contact is judged exactly; ≥ radius / resolution + 1
+
+    def __post_init__(self) -> None:
+        """Refuse a contact window without cells."""
+        require_whole("contact_reach", self.contact_reach, 1)

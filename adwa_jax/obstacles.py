@@ -1,0 +1,140 @@
+"""Unknown obstacles: where the movers are, what the robot senses of them, and how far they will be (§4 D)."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jax import lax
+
+from adwa_jax.scenario import Movers, UnknownSquares
+
+NOWHERE = 1e6  # distance [m] reported to what is absent; finite, so that no arithmetic on it makes a NaN
+UNROLLED = 16  # obstacles up to this many are unrolled into one fused expression
+
+
+class MoverStates(NamedTuple):
+    """The movers at one time."""
+
+    position: jax.Array  # [M, 2] float32 [m]
+    velocity: jax.Array  # [M, 2] float32 [m/s]
+    present: jax.Array  # [M] bool
+
+
+class Sensed(NamedTuple):
+    """What the robot knows of the unknown obstacles."""
+
+    square_centre: jax.Array  # [S, 2] float32 [m]
+    square_half_width: jax.Array  # [S] float32 [m]
+    square_known: jax.Array  # [S] bool, sensed now or before
+    position: jax.Array  # [M, 2] float32 [m]
+    velocity: jax.Array  # [M, 2] float32 [m/s]
+    radius: jax.Array  # [M] float32 [m]
+    seen: jax.Array  # [M] bool, in range now
+
+
+def movers_at(movers: Movers, time: jax.Array) -> MoverStates:
+    """Positions and velocities at `time` [s]: mirrored at the box, or along the track. Unbatched."""
+    free = _mirrored(movers, time)
+    if movers.track.shape[1] < 2:
+        return free
+    tracked = jax.vmap(_along_track, in_axes=(0, 0, 0, None))(movers.track, movers.track_length, movers.period, time)
+    has_track = (movers.track_length > 1)[:, None]
+    return MoverStates(
+        position=jnp.where(has_track, tracked.position, free.position),
+        velocity=jnp.where(has_track, tracked.velocity, free.velocity),
+        present=movers.valid & (tracked.present | ~has_track[:, 0]),
+    )
+
+
+def _mirrored(movers: Movers, time: jax.Array) -> MoverStates:
+    """Constant velocity with reflection: a straight line folded into the box [low, high]."""
+    span = jnp.maximum(movers.high - movers.low, 1e-6)
+    unfolded = movers.position - movers.low + movers.velocity * time
+    phase = unfolded - 2.0 * span * jnp.floor(unfolded / (2.0 * span))
+    back = phase > span
+    return MoverStates(
+        position=movers.low + jnp.where(back, 2.0 * span - phase, phase),
+        velocity=jnp.where(back, -movers.velocity, movers.velocity),
+        present=movers.valid,
+    )
+
+
+def _along_track(track: jax.Array, length: jax.Array, period: jax.Array, time: jax.Array) -> MoverStates:
+    """One mover between its track points: track [J, 3] rows (t, x, y), `length` in use."""
+    repeats = period > 0
+    cycle = jnp.where(repeats, period, 1.0)
+    time = jnp.where(repeats, time - cycle * jnp.floor(time / cycle), time)
+    used = jnp.arange(track.shape[0], dtype=jnp.int32) < length
+    index = jnp.clip(jnp.sum(used & (track[:, 0] <= time), dtype=jnp.int32) - 1, 0, jnp.maximum(length - 2, 0))
+    begin, end = track[index], track[index + 1]
+    lasting = jnp.maximum(end[0] - begin[0], 1e-6)
+    velocity = (end[1:] - begin[1:]) / lasting
+    within = jnp.clip(time - begin[0], 0.0, lasting)
+    present = repeats | ((time >= track[0, 0]) & (time <= track[jnp.maximum(length - 1, 0), 0]))
+    return MoverStates(begin[1:] + velocity * within, velocity, present)
+
+
+def sense(squares: UnknownSquares, known: jax.Array, movers: Movers, states: MoverStates, position: jax.Array,
+          sensor_range: jax.Array) -> Sensed:
+    """Squares within range become known and stay so; movers are seen while in range (§4 D a, b).
+
+    Range is measured to the obstacle's outline. Unbatched. known: [S] bool; position: [2] [m]; sensor_range: [] [m].
+    """
+    to_square = _distance_to_square(position[0], position[1], squares.centre.T, squares.half_width)
+    offset = states.position - position[None, :]
+    to_mover = jnp.sqrt(jnp.sum(offset * offset, axis=1)) - movers.radius
+    return Sensed(
+        square_centre=squares.centre,
+        square_half_width=squares.half_width,
+        square_known=known | (squares.valid & (to_square <= sensor_range)),
+        position=states.position,
+        velocity=states.velocity,
+        radius=movers.radius,
+        seen=states.present & (to_mover <= sensor_range),
+    )
+
+
+def clearance_to_squares(sensed: Sensed, x: jax.Array, y: jax.Array) -> jax.Array:
+    """Least distance [m] from points to known squares, `NOWHERE` without any. x, y: any equal shapes."""
+
+    def distance(index: jax.Array | int) -> jax.Array:
+        apart = _distance_to_square(x, y, sensed.square_centre[index], sensed.square_half_width[index])
+        return jnp.where(sensed.square_known[index], apart, NOWHERE)
+
+    return _least(distance, sensed.square_known.shape[0], jnp.full_like(x, NOWHERE))
+
+
+def clearance_to_movers(sensed: Sensed, x: jax.Array, y: jax.Array, ahead: jax.Array) -> jax.Array:
+    """Least distance [m] from points to seen movers `ahead` [s] from now, each going on at constant velocity (§4 D b).
+
+    Negative inside a mover; `NOWHERE` without any. x, y: any equal shapes; ahead: [].
+    """
+
+    def distance(index: jax.Array | int) -> jax.Array:
+        centre = sensed.position[index] + sensed.velocity[index] * ahead
+        apart = _norm(x - centre[0], y - centre[1]) - sensed.radius[index]
+        return jnp.where(sensed.seen[index], apart, NOWHERE)
+
+    return _least(distance, sensed.seen.shape[0], jnp.full_like(x, NOWHERE))
+
+
+def _least(distance: Callable[[jax.Array | int], jax.Array], count: int, start: jax.Array) -> jax.Array:
+    if count <= UNROLLED:
+        for index in range(count):
+            start = jnp.minimum(start, distance(index))
+        return start
+    return lax.fori_loop(0, count, lambda index, least: jnp.minimum(least, distance(index)), start)
+
+
+def _distance_to_square(x: jax.Array, y: jax.Array, centre: jax.Array, half_width: jax.Array) -> jax.Array:
+    dx = jnp.maximum(jnp.abs(x - centre[0]) - half_width, 0.0)
+    dy = jnp.maximum(jnp.abs(y - centre[1]) - half_width, 0.0)
+    return _norm(dx, dy)
+
+
+def _norm(dx: jax.Array, dy: jax.Array) -> jax.Array:
+    """√(dx² + dy²) with gradient 0, not NaN, at the origin."""
+    squared = dx * dx + dy * dy
+    positive = squared > 0
+    return jnp.where(positive, jnp.sqrt(jnp.where(positive, squared, 1.0)), 0.0)

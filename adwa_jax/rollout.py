@@ -1,0 +1,56 @@
+"""Trajectory prediction at constant velocity, forward Euler as printed (eq. 7)."""
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+
+class Pose(NamedTuple):
+    """Position and heading; arrays of one shape."""
+
+    x: jax.Array  # [m]
+    y: jax.Array  # [m]
+    heading: jax.Array  # [rad]
+
+
+class Arcs(NamedTuple):
+    """The predicted points of all candidates; those of one yaw rate lie on rays: x = x₀ + v · reach_x."""
+
+    reach_x: jax.Array  # [K, N] float32, x covered after k steps at 1 m/s [s]
+    reach_y: jax.Array  # [K, N] float32
+    heading: jax.Array  # [K, N] float32 [rad]
+
+
+def euler_step(pose: Pose, v: jax.Array, yaw_rate: jax.Array, dt: jax.Array) -> Pose:
+    """x + v·cosθ·dt, y + v·sinθ·dt, θ + yaw_rate·dt (eq. 7). Any equal shapes."""
+    return Pose(
+        x=pose.x + v * jnp.cos(pose.heading) * dt,
+        y=pose.y + v * jnp.sin(pose.heading) * dt,
+        heading=pose.heading + yaw_rate * dt,
+    )
+
+
+def arcs(heading: jax.Array, yaw_rate: jax.Array, dt: jax.Array, steps: int) -> Arcs:
+    """The K = `steps` points after each Euler step (eq. 7) for N yaw rates, per unit of speed.
+
+    Σ v·cosθ·dt = v · Σ cosθ·dt: all speeds share the sums. Unbatched. heading [rad], dt [s]: []; yaw_rate: [N] [rad/s].
+    """
+    count = jnp.arange(steps + 1, dtype=jnp.float32)[:, None]
+    headings = heading + count * yaw_rate[None, :] * dt
+    return Arcs(
+        reach_x=jnp.cumsum(jnp.cos(headings[:-1]) * dt, axis=0),
+        reach_y=jnp.cumsum(jnp.sin(headings[:-1]) * dt, axis=0),
+        heading=headings[1:],
+    )
+
+
+def rollout(pose: Pose, v: jax.Array, yaw_rate: jax.Array, dt: jax.Array, steps: int) -> Pose:
+    """Predicted poses [K, V, N] of every pair of V speeds and N yaw rates. Unbatched; pose fields []."""
+    arc = arcs(pose.heading, yaw_rate, dt, steps)
+    shape = (steps, v.shape[0], yaw_rate.shape[0])
+    return Pose(
+        x=pose.x + v[None, :, None] * arc.reach_x[:, None, :],
+        y=pose.y + v[None, :, None] * arc.reach_y[:, None, :],
+        heading=jnp.broadcast_to(arc.heading[:, None, :], shape),
+    )

@@ -1,0 +1,99 @@
+"""The terms of the evaluation function and their weighted sum (eqs. 8 and 9). Larger is better.
+
+Dimension letters: V speeds, N yaw rates.
+"""
+
+from dataclasses import dataclass
+from functools import partial
+from typing import Literal, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from adwa_jax.checks import require_numbers
+
+Normalisation = Literal["sum", "minmax", "none"]
+
+
+@partial(
+    jax.tree_util.register_dataclass,
+    data_fields=["local_heading", "clearance", "velocity", "global_heading"],
+    meta_fields=[],
+)
+@dataclass(frozen=True)
+class ScoreWeights:
+    """α, β, γ, δ of eq. 9; with `global_heading` 0 and the goal as local target, eq. 8. Traced, ≥ 0."""
+
+    local_heading: jax.Array | float  # α
+    clearance: jax.Array | float  # β
+    velocity: jax.Array | float  # γ
+    global_heading: jax.Array | float  # δ
+
+    def __post_init__(self) -> None:
+        """Refuse negative and non-finite weights; traced values pass unseen."""
+        require_numbers(self, least=0.0)
+
+
+class Terms(NamedTuple):
+    """One value a candidate and term."""
+
+    local_heading: jax.Array  # [V, N]
+    clearance: jax.Array  # [V, N]
+    velocity: jax.Array  # [V, N]
+    global_heading: jax.Array  # [V, N]
+
+
+def heading_term(x: jax.Array, y: jax.Array, heading: jax.Array, target: jax.Array) -> jax.Array:
+    """π − |angle between the end heading and the bearing end → target|, in [0, π] (LHeading and GHeading of eq. 9).
+
+    On the target itself the bearing has no meaning and the term is π. Any equal shapes; target: [2] [m].
+    """
+    dx, dy = target[0] - x, target[1] - y
+    ahead = jnp.cos(heading) * dx + jnp.sin(heading) * dy
+    aside = jnp.abs(jnp.cos(heading) * dy - jnp.sin(heading) * dx)
+    arrived = (dx == 0) & (dy == 0)
+    return jnp.pi - jnp.arctan2(aside, jnp.where(arrived, 1.0, ahead))
+
+
+def clearance_term(clearance: jax.Array, cap: jax.Array) -> jax.Array:
+    """Dist of eq. 9: the candidate's clearance [m] up to `cap`, beyond which more room is no better."""
+    return jnp.minimum(clearance, cap)
+
+
+def velocity_term(v: jax.Array, shape: tuple[int, ...]) -> jax.Array:
+    """Vel of eq. 9: the candidate's speed [m/s], negative in reverse. v: [V]; shape (V, N)."""
+    return jnp.broadcast_to(v[:, None], shape)
+
+
+def normalise(terms: Terms, admissible: jax.Array, scales: Terms, normalisation: Normalisation) -> Terms:
+    """Each term over its sum over the admissible candidates (`sum`), its range there (`minmax`) or a fixed scale.
+
+    A term whose sum or range is 0 says nothing and becomes 0. admissible: [V, N] bool; scales: [] each, for `none`.
+    """
+    if normalisation == "none":
+        return Terms(*(term / scale for term, scale in zip(terms, scales, strict=True)))
+    if normalisation == "minmax":
+        return Terms(*(_over_range(term, admissible) for term in terms))
+    return Terms(*(_over_sum(term, admissible) for term in terms))
+
+
+def weighted_sum(terms: Terms, weights: ScoreWeights) -> jax.Array:
+    """G = α·LHeading + β·Dist + γ·Vel + δ·GHeading (eq. 9), [V, N]."""
+    return (
+        weights.local_heading * terms.local_heading
+        + weights.clearance * terms.clearance
+        + weights.velocity * terms.velocity
+        + weights.global_heading * terms.global_heading
+    )
+
+
+def _over_sum(term: jax.Array, admissible: jax.Array) -> jax.Array:
+    total = jnp.sum(jnp.where(admissible, term, 0.0))
+    return jnp.where(total != 0, term / jnp.where(total != 0, total, 1.0), 0.0)
+
+
+def _over_range(term: jax.Array, admissible: jax.Array) -> jax.Array:
+    least = jnp.min(jnp.where(admissible, term, jnp.inf))
+    span = jnp.max(jnp.where(admissible, term, -jnp.inf)) - least
+    distinct = jnp.isfinite(span) & (span > 1e-12)
+    return jnp.where(distinct, (term - jnp.where(distinct, least, 0.0)) / jnp.where(distinct, span, 1.0), 0.0)

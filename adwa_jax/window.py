@@ -1,0 +1,60 @@
+"""The velocities the robot can reach in one control step (eq. 6)."""
+
+from dataclasses import dataclass
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+
+from adwa_jax.checks import require, require_numbers
+
+
+@partial(
+    jax.tree_util.register_dataclass,
+    data_fields=["radius", "v_min", "v_max", "yaw_rate_max", "acceleration", "yaw_acceleration", "brake", "yaw_brake"],
+    meta_fields=[],
+)
+@dataclass(frozen=True)
+class RobotLimits:
+    """A disc robot's size and limits. Traced."""
+
+    radius: jax.Array | float  # [m]
+    v_min: jax.Array | float  # [m/s]; negative: may reverse
+    v_max: jax.Array | float  # [m/s]
+    yaw_rate_max: jax.Array | float  # [rad/s], both ways
+    acceleration: jax.Array | float  # [m/s²], bounds the window
+    yaw_acceleration: jax.Array | float  # [rad/s²]
+    brake: jax.Array | float  # [m/s²], what admissibility counts on
+    yaw_brake: jax.Array | float  # [rad/s²]
+
+    def __post_init__(self) -> None:
+        """Refuse limits no robot can have; traced values pass unseen."""
+        if not require_numbers(self, least=-100.0):
+            return
+        for name in ("radius", "v_max", "yaw_rate_max", "acceleration", "yaw_acceleration", "brake", "yaw_brake"):
+            value = getattr(self, name)
+            require(value > 0, name, float(value), "must be positive", "set it in SI units")
+        require(self.v_min <= self.v_max, "v_min", float(self.v_min), f"must not exceed v_max = {self.v_max:g}",
+                "lower it")
+
+
+def velocity_window(v: jax.Array, yaw_rate: jax.Array, robot: RobotLimits, dt: jax.Array, v_samples: int,
+                    yaw_rate_samples: int) -> tuple[jax.Array, jax.Array]:
+    """[V] speeds and [N] yaw rates: [v ± a·dt] ∩ [v_min, v_max] and likewise the yaw rate, evenly, ends included.
+
+    Where the limits leave nothing (the robot is faster than v_max allows), the reachable value nearest to them is all.
+    Unbatched. v [m/s], yaw_rate [rad/s], dt [s]: [] float32.
+    """
+    v_reach, yaw_reach = robot.acceleration * dt, robot.yaw_acceleration * dt
+    speeds = _samples(v, v_reach, robot.v_min, robot.v_max, v_samples)
+    yaw_rates = _samples(yaw_rate, yaw_reach, -robot.yaw_rate_max, robot.yaw_rate_max, yaw_rate_samples)
+    return speeds, yaw_rates
+
+
+def _samples(value: jax.Array, reach: jax.Array, least: jax.Array | float, most: jax.Array | float,
+             count: int) -> jax.Array:
+    # A robot already beyond its limits gets the one value that brings it nearest to them.
+    low = jnp.clip(least, value - reach, value + reach)
+    high = jnp.clip(most, value - reach, value + reach)
+    share = jnp.arange(count, dtype=jnp.float32) / max(count - 1, 1)
+    return low * (1.0 - share) + high * share
