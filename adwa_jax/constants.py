@@ -56,7 +56,7 @@ class Constants:
 class PlanOptions:
     """Static choices of the global plan (§2)."""
 
-    search: SearchOptions = SearchOptions()
+    search: SearchOptions = field(default_factory=SearchOptions)
     scope: Scope = "node"
     keypoint_rule: KeyPointRule = "anchor"
     inflate: bool = True  # block cells whose centre is within the robot's radius of an occupied square

@@ -31,7 +31,8 @@ class RobotLimits:
         """Refuse limits no robot can have; traced values pass unseen."""
         if not require_numbers(self, least=-100.0):
             return
-        for name in ("radius", "v_max", "yaw_rate_max", "acceleration", "yaw_acceleration", "brake", "yaw_brake"):
+        require(self.radius >= 0, "radius", float(self.radius), "must be ≥ 0", "set it in metres")
+        for name in ("v_max", "yaw_rate_max", "acceleration", "yaw_acceleration", "brake", "yaw_brake"):
             value = getattr(self, name)
             require(value > 0, name, float(value), "must be positive", "set it in SI units")
         require(self.v_min <= self.v_max, "v_min", float(self.v_min), f"must not exceed v_max = {self.v_max:g}",

@@ -151,7 +151,7 @@ def reference_length(path_file: str | Path) -> float:
     content = read_bytes(path_file, "a BARN path file")
     try:
         cells = np.asarray(np.load(BytesIO(content), allow_pickle=False), np.float64)
-    except (ValueError, TypeError, OSError, EOFError) as error:
+    except Exception as error:  # numpy's reader of headers raises anything from ValueError to TokenError
         raise bad_input(path_file, f"cannot be read ({error})", "a BARN path file is an .npy array [P, 2]",
                         "fetch the file again") from None
     if cells.ndim != 2 or cells.shape[1] != 2 or len(cells) == 0 or not np.isfinite(cells).all():
@@ -213,10 +213,10 @@ def _parse(path: str | Path) -> ElementTree.Element:
     except (OSError, EOFError, zlib.error) as error:
         raise bad_input(path, f"cannot be unpacked ({error})", "a .gz file is packed by gzip",
                         "fetch it again, or drop .gz from the name of an unpacked one") from None
-    except ElementTree.ParseError as error:
-        raise bad_input(f"{path}:{error.position[0]}", f"is not XML ({error})",
-                        f"{_KIND} is a Gazebo world (SDF)",
-                        "check that this is such a file, complete") from None
+    except (ElementTree.ParseError, ValueError, LookupError) as error:
+        line, _ = getattr(error, "position", (1, 0))
+        raise bad_input(f"{path}:{line}", f"is not XML ({error})",
+                        f"{_KIND} is a Gazebo world (SDF)", "check that this is such a file, complete") from None
 
 
 def _foreign(path: str | Path, found: str) -> InputError:

@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
@@ -43,7 +42,7 @@ class MapFile:
         """Share of the cells that are unknown, 0..1."""
         return float(self.unknown.mean())
 
-    def grid(self, unknown: Literal["occupied", "free"] = "occupied") -> Grid:
+    def grid(self, unknown: str = "occupied") -> Grid:
         """The map as an unpadded Grid with numpy leaves, its unknown cells taken as `unknown` says.
 
         Raises InputError for another policy and for a map that has no free cell under it.

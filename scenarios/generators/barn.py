@@ -6,8 +6,8 @@ filled and what lies beyond them counts as filled; what lies beyond the field's 
 benchmark's 300 worlds are 25 for each pair of a fill share in {0.15, 0.20, 0.25, 0.30} and 2, 3 or 4
 smoothings.
 
-Same frame as the benchmark's worlds: x from -4.5 m, y from 0; 34 rows of a walled entry corridor, the field,
-then free rows to beyond the goal.
+Same frame as the benchmark's worlds as `scenarios.formats` loads them: x from -4.5 m, y from 0; 34 rows of a
+walled entry corridor, the field, then 32 rows, walled at the sides, to beyond the goal.
 """
 
 import math
@@ -83,7 +83,7 @@ def _draw_map(draws: Draws, spec: BarnSpec) -> np.ndarray:
     fill = spec.fill[draws.index(len(spec.fill))]
     smoothings = spec.smoothings[draws.index(len(spec.smoothings))]
     occupied = np.zeros((ENTRY_ROWS + FIELD_CELLS + EXIT_ROWS, FIELD_CELLS), np.bool_)
-    occupied[0] = occupied[:ENTRY_ROWS, 0] = occupied[:ENTRY_ROWS, -1] = True
+    occupied[0] = occupied[:, 0] = occupied[:, -1] = True
     for _ in range(MAP_TRIES):
         occupied[ENTRY_ROWS : ENTRY_ROWS + FIELD_CELLS] = _draw_field(draws, fill, smoothings)
         if joined(inflated(occupied, RESOLUTION, spec.robot_radius), start, goal):

@@ -2,9 +2,9 @@
 
 A cell is blocked when the robot, centred on it, would touch an occupied square (`adwa_jax.grid.inflate`).
 Under the corner rule `never` a diagonal step needs both orthogonal neighbours free, so two cells are
-connected iff they are 4-connected. All of this runs on the host in numpy: maps are drawn one at a time,
-before anything is compiled. Dimension letters: H, W rows and columns of the map; N offsets; E edges between
-runs.
+connected iff they are 4-connected. All of this runs on the host in numpy: maps are drawn one at a time, and
+every size would compile anew.
+Dimension letters: H, W rows and columns of the map; N offsets; E edges between runs.
 """
 
 import numpy as np

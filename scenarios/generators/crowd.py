@@ -19,8 +19,7 @@ from scenarios.generators.task_spec import Range, TaskSpec, demand, demand_count
 MARGIN = 1.0
 """Recorded tracks: free ground around the box of all recorded points [m]."""
 PLACE_TRIES = 32
-"""Starting points looked at for a person (made-up tracks) or for the robot (recorded ones); the clearest is
-taken."""
+"""Starting points looked at for a person (made-up tracks) or the robot (recorded ones); the clearest is taken."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,7 +87,11 @@ def from_tracks(key: jax.Array, spec: CrowdSpec, tracks: Sequence[np.ndarray]) -
     shape = tuple(int(n) for n in np.ceil((high - low) / spec.resolution)[::-1])
     high = low + np.array(shape[::-1]) * spec.resolution
     people = _stretch(streams.movers, spec.time_limit, tracks)
-    tries = [_crossing(streams.task, tuple(low), tuple(high), spec.inset) for _ in range(PLACE_TRIES)]
+    inset = min(spec.inset, float(min(high - low)) / 3)
+    if inset < spec.robot_radius + spec.resolution:
+        raise InputError(f"robot_radius: {spec.robot_radius:g} m; too large for the place of these tracks, "
+                         f"{shape[1] * spec.resolution:g} × {shape[0] * spec.resolution:g} m; take a smaller one")
+    tries = [_crossing(streams.task, tuple(low), tuple(high), inset) for _ in range(PLACE_TRIES)]
     start, goal = max(tries, key=lambda ends: min(_gaps_at_start(people, ends[0]), default=math.inf))
     clear = [gap > spec.mover_distance for gap in _gaps_at_start(people, start)]
     kept = [person for person, is_clear in zip(people, clear, strict=True) if is_clear]
@@ -167,12 +170,11 @@ def _stretch(draws: Draws, duration: float, tracks: Sequence[np.ndarray]) -> lis
 
 def _cut(track: np.ndarray, begin: float, end: float) -> np.ndarray:
     """[J, 3] the part of a track between two times, with points put in at the cuts; may be empty."""
-    t = track[:, 0]
-    inner = t[(t > begin) & (t < end)]
-    times = np.concatenate([[max(begin, t[0])], inner[inner > t[0]], [min(end, t[-1])]])
-    times = np.unique(times.astype(np.float32)).astype(np.float64) if times[0] < times[-1] else times[:0]
-    xy = [np.interp(times, t, track[:, axis]) for axis in (1, 2)]
-    return np.stack([times - begin, *xy], axis=1)
+    t = track[:, 0] - begin
+    ends = np.array([max(0.0, t[0]), min(end - begin, t[-1])])
+    times = np.concatenate([ends, t[(t > ends[0]) & (t < ends[1])]]) if ends[0] < ends[1] else ends[:0]
+    times = np.unique(times.astype(np.float32)).astype(np.float64)  # increasing in the precision of the movers
+    return np.stack([times, *(np.interp(times, t, track[:, axis]) for axis in (1, 2))], axis=1)
 
 
 def _gaps_at_start(people: Sequence[np.ndarray], robot: Point) -> list[float]:

@@ -46,8 +46,7 @@ class Ground:
 
 
 def prepare(grid: Grid, robot_radius: float, name: str = "map") -> Ground:
-    """The map made ready for tasks of a robot of `robot_radius` [m]: start and goal come from its largest
-    component.
+    """The map made ready for tasks of a robot of `robot_radius` [m], which start and end in its largest component.
 
     grid: unpadded, numpy or jax leaves. Raises InputError where no two cells are connected.
     """

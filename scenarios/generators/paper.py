@@ -1,5 +1,4 @@
-"""The maps of the paper's simulations (§5): square, start upper left, goal lower right, obstacles cell by
-cell."""
+"""The maps of the paper's simulations (§5): square, from upper left to lower right, obstacles cell by cell."""
 
 from dataclasses import dataclass
 
@@ -22,8 +21,7 @@ MAP_TRIES = 16
 
 @dataclass(frozen=True, kw_only=True)
 class PaperSpec(TaskSpec):
-    """A `cells` × `cells` map of 1 m cells, each an obstacle with probability `density` (start and goal
-    never).
+    """A map of `cells` × `cells` of 1 m, each an obstacle with probability `density`, start and goal never.
 
     The paper prints maps of 15, 20 and 25 cells but neither density nor counts of obstacles: those are our
     choice. `movers` None: 8 on 25 × 25 cells and in proportion to the area (3 on 15², 5 on 20²). `time_limit`
@@ -65,8 +63,7 @@ def generate(key: jax.Array, spec: PaperSpec) -> Scenario:
 
 
 def _draw_map(draws: Draws, spec: PaperSpec, start: tuple[int, int], goal: tuple[int, int]) -> np.ndarray:
-    """[H, W] bool, start and goal connected; the robot fits into every free cell, for a cell is wider than
-    it."""
+    """[H, W] bool, start and goal connected; the robot, narrower than a cell, fits into every free one."""
     occupied = np.zeros((spec.cells, spec.cells), np.bool_)
     for _ in range(MAP_TRIES):
         occupied = draws.uniforms(spec.cells, spec.cells) < spec.density

@@ -1,5 +1,4 @@
-"""What blocks, rooms, mazes and a user's own map share: unknown squares and patrols on a map with its
-task."""
+"""What blocks, rooms, mazes and a user's own map share: unknown squares and patrols on the map of a task."""
 
 import math
 
@@ -18,8 +17,7 @@ from scenarios.generators.tasks import far_pair
 
 def scenario_between_rooms(streams: Streams, occupied: np.ndarray, spec: TaskSpec, resolution: float,
                            separation: float) -> Scenario:
-    """A scenario on a map whose largest component spans it: start and goal `separation` · diagonal apart, or
-    more.
+    """A scenario on a map whose largest component spans it: start and goal at least `separation` · diagonal apart.
 
     occupied: [H, W] bool; consumes all streams but `map`.
     """

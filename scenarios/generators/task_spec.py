@@ -1,34 +1,35 @@
-"""What every generator's spec has in common: the robot, the task, and what the robot does not know
-beforehand."""
+"""What all specs have in common: the robot, the task, and what the robot does not know beforehand."""
 
 import math
 from dataclasses import dataclass
+
+from scenarios.errors import InputError
 
 Range = tuple[float, float]
 """(least, greatest)."""
 
 
 def demand(holds: bool, field: str, value: object, rule: str, remedy: str) -> None:
-    """Raises ValueError with the field, its value, the rule and the remedy unless the rule holds."""
+    """Raises InputError with the field, its value, the rule and the remedy unless the rule holds."""
     if not holds:
-        raise ValueError(f"{field}: {value!r}; {rule}; {remedy}")
+        raise InputError(f"{field}: {value!r}; {rule}; {remedy}")
 
 
 def demand_number(field: str, value: float, low: float, high: float = math.inf) -> None:
-    """Raises ValueError unless the value is finite and in [low, high]."""
+    """Raises InputError unless the value is finite and in [low, high]."""
     remedy = f"try {min(max(value, low), high) if math.isfinite(value) else low:g}"
     holds = math.isfinite(value) and low <= value <= high
     demand(holds, field, value, f"must be a finite number {_between(low, high)}", remedy)
 
 
 def demand_count(field: str, value: int, low: int, high: int = 10_000) -> None:
-    """Raises ValueError unless the value is a whole number in [low, high]."""
+    """Raises InputError unless the value is a whole number in [low, high]."""
     whole = isinstance(value, int) and not isinstance(value, bool) and low <= value <= high
     demand(whole, field, value, f"must be a whole number from {low} to {high}", f"try {low}")
 
 
 def demand_range(field: str, value: Range, low: float, high: float = math.inf) -> None:
-    """Raises ValueError unless value is (least, greatest) with low ≤ least ≤ greatest ≤ high, all finite."""
+    """Raises InputError unless value is (least, greatest) with low ≤ least ≤ greatest ≤ high, all finite."""
     ordered = len(value) == 2 and all(map(math.isfinite, value)) and low <= value[0] <= value[1] <= high
     rule = f"must be (least, greatest), both finite and {_between(low, high)}"
     demand(ordered, field, value, rule, "give two numbers in rising order")
@@ -43,7 +44,7 @@ class TaskSpec:
     """Static numbers shared by the generators; lengths in metres, times in seconds.
 
     `squares` and `movers` are upper counts: where a map has no room for more under the rules below, it gets
-    fewer. Raises ValueError (field, value, rule, remedy) for nonsense.
+    fewer. Raises InputError (field, value, rule, remedy) for nonsense.
     """
 
     robot_radius: float = 0.25  # start and goal are connected for a disc of this radius
@@ -76,8 +77,7 @@ class TaskSpec:
 
 
 def demand_fit(field: str, opening_cells: int, resolution: float, robot_radius: float) -> None:
-    """Raises ValueError unless a robot centred on the middle cell of an opening touches neither side of
-    it."""
+    """Raises InputError unless a robot centred on the middle cell of an opening touches neither side of it."""
     room = ((opening_cells + 1) // 2 - 0.5) * resolution
     demand(room > robot_radius, field, opening_cells,
            f"its middle cell must be farther than robot_radius {robot_radius:g} m from its sides and is {room:g} m "

@@ -10,8 +10,7 @@ PAIR_TRIES = 64
 
 
 def far_pair(draws: Draws, cells: np.ndarray, least: float) -> tuple[Cell, Cell]:
-    """Two of the cells [N, 2] (row, column), N ≥ 2, at least `least` cells apart (centre to centre,
-    Euclidean).
+    """Two of the cells [N, 2] (row, column), N ≥ 2, at least `least` apart, counted in cells, centre to centre.
 
     Uniform over such pairs; where `PAIR_TRIES` pairs hold none, a random cell and the one farthest from it.
     """

@@ -26,10 +26,10 @@ DIRECTIONS = {">": (1.0, 0.0), "<": (-1.0, 0.0), "^": (0.0, 1.0), "v": (0.0, -1.
 
 @dataclass(frozen=True, kw_only=True)
 class ToySpec(TaskSpec):
-    """A drawing, its first line on top: `#` occupied, `.` free, `S` start, `G` goal, `o` unknown square,
-    movers `> < ^ v`.
+    """A drawing of the map and the task, its first line on top.
 
-    A character is a cell of `resolution` [m]. Movers go at the lower end of `mover_speed`, have the lower
+    `#` is occupied, `.` free, `S` start, `G` goal, `o` an unknown square; `> < ^ v` are movers and where they
+    head. A character is a cell of `resolution` [m]. Movers go at the lower end of `mover_speed`, have the lower
     radius, and are mirrored at the border. As drawn: nothing is moved or made solvable.
     """
 
@@ -53,8 +53,10 @@ class ToySpec(TaskSpec):
 
 
 def generate(key: jax.Array, spec: ToySpec) -> Scenario:
-    """The scenario as drawn, numpy leaves, origin (0, 0). The key is there for the common signature and is
-    not used."""
+    """The scenario as drawn, numpy leaves, origin (0, 0).
+
+    The key is there for the common signature and is not used.
+    """
     del key
     cells = np.array([list(line) for line in reversed(spec.drawing.split())])
     start, goal = (centre(_cells(cells, end)[0], spec.resolution) for end in "SG")
@@ -65,8 +67,7 @@ def generate(key: jax.Array, spec: ToySpec) -> Scenario:
 
 
 def _drawn_movers(cells: np.ndarray, spec: ToySpec) -> Movers:
-    """The movers of a drawing [H, W] of characters, in the order of `DIRECTIONS`, then row by row from
-    below."""
+    """The movers of a drawing [H, W] of characters, in the order of `DIRECTIONS`, then row by row from below."""
     drawn = [(cell, way) for mark, way in DIRECTIONS.items() for cell in _cells(cells, mark)]
     radius, speed, count = spec.mover_radius[0], spec.mover_speed[0], len(drawn)
     width, height = cells.shape[1] * spec.resolution, cells.shape[0] * spec.resolution

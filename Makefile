@@ -1,0 +1,36 @@
+# Needs python3 >= 3.11 and nothing else: the first target run makes .venv with the versions of uv.lock.
+PYTHON ?= python3
+UV_VERSION := 0.13.9
+BIN := .venv/bin
+STAMP := .venv/.installed
+
+.PHONY: demo test bench lint figures clean
+
+demo: $(STAMP)
+	$(BIN)/adwa demo --out out
+
+test: $(STAMP)
+	$(BIN)/python -m pytest
+
+bench: $(STAMP)
+	$(BIN)/python -m tests.benchmarks
+
+lint: $(STAMP)
+	$(BIN)/ruff check
+	$(BIN)/pyright
+
+# The README's pictures.
+figures: $(STAMP)
+	$(BIN)/python -m tuning.readme_pictures
+
+clean:
+	rm -rf .venv out dist .pytest_cache .ruff_cache .hypothesis .jax_cache
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+$(STAMP): pyproject.toml uv.lock
+	@$(PYTHON) -c 'import sys; ok = sys.version_info >= (3, 11); \
+	sys.exit(0 if ok else "$(PYTHON) is Python %d.%d, 3.11 or newer is needed: make PYTHON=python3.11" % sys.version_info[:2])'
+	$(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check uv==$(UV_VERSION)
+	UV_PROJECT_ENVIRONMENT=.venv $(BIN)/uv sync --frozen --quiet
+	@touch $@

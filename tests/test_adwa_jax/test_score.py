@@ -1,0 +1,120 @@
+"""The terms of eqs. 8 and 9, their normalisation and their sum."""
+
+import math
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from adwa_jax.score import ScoreWeights, Terms, clearance_term, heading_term, normalise, velocity_term, weighted_sum
+from tests.reference import dwa as reference
+from tests.test_adwa_jax.worlds import many_examples
+
+PI = math.pi
+
+
+def heading(x, y, angle, target):
+    return heading_term(jnp.float32(x), jnp.float32(y), jnp.float32(angle), jnp.float32(target))
+
+
+@pytest.mark.parametrize(("pose", "target", "value"), [
+    ((1, 1, 0), (3, 1), PI),  # straight ahead
+    ((1, 1, PI), (3, 1), 0),  # straight behind
+    ((1, 1, 0), (1, 5), PI / 2),
+    ((1, 1, 0), (1, -5), PI / 2),
+    ((1, 1, -PI / 4), (2, 2), PI / 2),
+    ((0, 0, 3 * PI / 4), (-1, -1), PI / 2),  # across ±π
+    ((2, 3, 1.234), (2, 3), PI),  # on the target
+    ((0, 0, 20 * PI), (1, 0), PI),
+])
+def test_heading_term_by_hand(pose, target, value):
+    assert float(heading(*pose, target)) == pytest.approx(value, abs=2e-5)
+
+
+coordinate = st.floats(-10, 10, width=32)
+
+
+@many_examples
+@given(coordinate, coordinate, coordinate, st.tuples(coordinate, coordinate))
+def test_heading_term_equals_double_precision_and_stays_in_range(x, y, angle, target):
+    value = float(heading(x, y, angle, target))
+    assert -1e-6 <= value <= PI + 1e-6
+    if math.dist((x, y), target) > 1e-3:
+        assert value == pytest.approx(reference.heading_term((x, y, angle), target), abs=2e-3)
+
+
+def test_heading_gradients_are_finite_on_the_target_ahead_of_it_and_behind_it():
+    slopes = jax.grad(heading_term, argnums=(0, 1, 2, 3))
+    for x, y, angle, target in (
+        (2.0, 3.0, 0.3, (2.0, 3.0)),
+        (0.0, 0.0, 0.0, (0.0, 0.0)),
+        (1.0, 1.0, 0.0, (3.0, 1.0)),
+        (1.0, 1.0, 0.0, (-1.0, 1.0)),
+        (0.0, 0.0, 0.0, (1e-20, 0.0)),
+        (0.0, 0.0, 0.0, (1e-30, 1e-30)),
+    ):
+        for slope in slopes(jnp.float32(x), jnp.float32(y), jnp.float32(angle), jnp.float32(target)):
+            assert np.isfinite(slope).all(), (x, y, angle, target)
+    # Target to the left: turning left, the heading grows and so does the term.
+    assert float(slopes(jnp.float32(0), jnp.float32(0), jnp.float32(0), jnp.float32([1, 1]))[2]) == pytest.approx(1.0)
+
+
+def test_clearance_is_capped_and_velocity_is_the_speed():
+    np.testing.assert_allclose(clearance_term(jnp.float32([-0.5, 0.2, 3.0]), jnp.float32(0.5)), [-0.5, 0.2, 0.5])
+    np.testing.assert_array_equal(velocity_term(jnp.float32([0.1, -0.2]), (2, 3)), np.float32([[0.1] * 3, [-0.2] * 3]))
+
+
+def terms_of(values):
+    """The same [V, N] values as every term."""
+    return Terms(*[jnp.asarray(values, jnp.float32)] * 4)
+
+
+SCALES = Terms(*map(jnp.float32, (PI, 0.5, 2.0, PI)))
+
+
+@pytest.mark.parametrize(("rule", "expected"), [
+    ("sum", [[0.125, 0.375], [0.5, None]]),
+    ("minmax", [[0.0, 2 / 3], [1.0, None]]),
+])
+def test_normalisation_looks_at_admissible_candidates_only(rule, expected):
+    admissible = jnp.array([[True, True], [True, False]])
+    for term in normalise(terms_of([[1, 3], [4, 1000]]), admissible, SCALES, rule):
+        for found, wanted in zip(np.ravel(term), np.ravel(np.array(expected, object)), strict=True):
+            assert wanted is None or float(found) == pytest.approx(wanted, rel=1e-6)
+
+
+def test_none_divides_by_fixed_scales():
+    found = normalise(terms_of([[1.0, 2.0]]), jnp.array([[True, False]]), SCALES, "none")
+    for term, scale in zip(found, (PI, 0.5, 2.0, PI), strict=True):
+        np.testing.assert_allclose(term[0, 0], 1 / scale, rtol=1e-6)
+
+
+@pytest.mark.parametrize("rule", ["sum", "minmax"])
+@pytest.mark.parametrize("values", [[[0.0, 0.0]], [[2.0, 2.0]], [[1.0, -1.0]]])
+@pytest.mark.parametrize("admissible", [[[True, True]], [[True, False]], [[False, False]]])
+def test_normalisation_never_makes_a_nan_nor_do_its_gradients(rule, values, admissible):
+    def total(value):
+        return sum(jnp.sum(term) for term in normalise(Terms(*[value] * 4), jnp.array(admissible), SCALES, rule))
+
+    value, slope = jax.value_and_grad(total)(jnp.asarray(values, jnp.float32))
+    assert np.isfinite(value)
+    assert np.isfinite(slope).all()
+
+
+def test_a_term_that_is_alike_for_all_says_nothing_under_minmax():
+    for term in normalise(terms_of([[2.0, 2.0]]), jnp.array([[True, True]]), SCALES, "minmax"):
+        np.testing.assert_array_equal(term, [[0.0, 0.0]])
+
+
+def test_weighted_sum_is_eq_9():
+    terms = Terms(*(jnp.full((1, 1), value, jnp.float32) for value in (1.0, 10.0, 100.0, 1000.0)))
+    assert float(weighted_sum(terms, ScoreWeights(0.5, 0.25, 2.0, 3.0))[0, 0]) == 0.5 + 2.5 + 200 + 3000
+
+
+@pytest.mark.parametrize("value", [-0.1, float("nan"), float("inf"), "0.4", True])
+def test_weights_that_are_no_weights_are_refused(value):
+    with pytest.raises(ValueError, match="velocity"):
+        ScoreWeights(0.4, 0.4, value, 0.1)

@@ -1,0 +1,82 @@
+"""One scenario driven with its path kept, for pictures and animations."""
+
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import jax
+import numpy as np
+
+from adwa_jax.constants import Constants, Options
+from adwa_jax.plan import Plan, plan
+from adwa_jax.presets import Preset
+from adwa_jax.scenario import Scenario
+from adwa_jax.simulate import Episode, Outcome, Trace, trace
+from scenarios.errors import InputError
+from scenarios.padding import pad, padded_shape
+from tuning.evaluate import batch_of, planned_columns
+
+
+@dataclass(frozen=True)
+class Replay:
+    """A driven scenario on the host."""
+
+    scenario: Scenario
+    plan: Plan
+    episode: Episode
+    trace: Trace
+
+    @property
+    def outcome(self) -> Outcome:
+        """How it ended."""
+        return Outcome(int(self.episode.outcome))
+
+    def summary(self) -> dict[str, Any]:
+        """Outcome, measures and the driven path [[x, y], ...] [m]."""
+        measures = {name: np.asarray(value).item() for name, value in self.episode.measures._asdict().items()}
+        planned = {name: np.asarray(value).item() for name, value in planned_columns(self.plan).items()}
+        used = int(self.trace.length)
+        path = np.stack([self.trace.robot.x[:used], self.trace.robot.y[:used]], axis=-1)
+        return {"outcome": self.outcome.name, **planned, **measures, "driven_path": np.round(path, 4).tolist()}
+
+    def sentence(self) -> str:
+        """What happened, in a line."""
+        measures = self.episode.measures
+        return (f"{self.outcome.name} after {float(measures.time):.1f} s and {float(measures.length):.2f} m "
+                f"(shortest {float(self.plan.optimal_length):.2f} m), "
+                f"least clearance {float(measures.least_clearance):.2f} m")  # fmt: skip
+
+
+def replay(scenario: Scenario, config: Preset) -> Replay:
+    """Plan and drive one scenario, keeping the path."""
+    constants = jax.tree.map(np.float32, config.constants)
+    batch = batch_of(scenario, constants, config.options)
+    steps = round(float(scenario.time_limit) / float(constants.behaviour.dt))
+    padded = pad(scenario, padded_shape(scenario))
+    planned, episode, path = jax.device_get(_replay(padded, constants, batch.options, steps))
+    return Replay(scenario, planned, episode, path)
+
+
+@partial(jax.jit, static_argnames=("options", "steps"))
+def _replay(scenario: Scenario, constants: Constants, options: Options, steps: int) -> tuple[Plan, Episode, Trace]:
+    planned = plan(scenario.grid, scenario.start[:2], scenario.goal, constants, options.plan)
+    return planned, *trace(scenario, planned, constants, options, steps)
+
+
+def draw_replay(driven: Replay, title: str, figure: Path, animation: Path | None) -> list[Path]:
+    """Write the picture (as Fig. 4) and, if asked for, the animation; returns the files written."""
+    import matplotlib.pyplot as plt
+
+    from tuning.figures import animate_drive, drive_figure
+
+    parts = (driven.scenario, driven.plan, driven.episode, driven.trace)
+    try:
+        picture = drive_figure(*parts, title=title)
+        picture.savefig(figure, dpi=150)
+        plt.close(picture)
+        if animation:
+            animate_drive(animation, *parts, title=title)
+    except ValueError as error:
+        raise InputError(f"{figure if not figure.exists() else animation}: {error}") from None
+    return [figure, animation] if animation else [figure]

@@ -1,0 +1,78 @@
+"""What an evaluation found: one row a scenario, outcomes counted, rates and means with their intervals."""
+
+import csv
+import json
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from adwa_jax.simulate import Outcome
+from tuning.intervals import wilson
+
+OVER_ALL = ("spl", "barn_score")  # success is part of their definition: their means are over all scenarios
+
+
+@dataclass(frozen=True)
+class Results:
+    """One value a scenario in every column; N scenarios, in the suite's order."""
+
+    suite: str
+    names: tuple[str, ...]  # N
+    outcome: np.ndarray  # [N] int32, an `Outcome`
+    measures: dict[str, np.ndarray]  # name -> [N]; planned path first, then driven path (units: metrics)
+
+    @property
+    def count(self) -> int:
+        """How many scenarios."""
+        return len(self.names)
+
+    @property
+    def reached(self) -> np.ndarray:
+        """[N] bool."""
+        return self.outcome == Outcome.REACHED
+
+    def outcomes(self) -> dict[str, int]:
+        """Scenarios by outcome, every outcome named."""
+        counted = Counter(self.outcome.tolist())
+        return {outcome.name: counted.get(int(outcome), 0) for outcome in Outcome}
+
+    def means(self) -> dict[str, float | None]:
+        """Mean of every measure over the successes (of `OVER_ALL` over all scenarios); None where there is none."""
+        return {name: self._mean(name, values) for name, values in self.measures.items()}
+
+    def _mean(self, name: str, values: np.ndarray) -> float | None:
+        taken = values if name in OVER_ALL else values[self.reached]
+        return float(np.mean(taken, dtype=np.float64)) if taken.size else None
+
+    def summary(self) -> dict[str, Any]:
+        """The JSON form: count, outcomes, success_rate, success_ci, means and a list of scenarios."""
+        successes = int(self.reached.sum())
+        return {
+            "suite": self.suite,
+            "count": self.count,
+            "outcomes": self.outcomes(),
+            "success_rate": successes / self.count,
+            "success_ci": list(wilson(successes, self.count)),
+            "means_over": f"successes ({successes}); {' and '.join(OVER_ALL)}: all scenarios",
+            "means": self.means(),
+            "scenarios": [self.scenario(index) for index in range(self.count)],
+        }
+
+    def scenario(self, index: int) -> dict[str, Any]:
+        """One scenario's row."""
+        row = {name: values[index].item() for name, values in self.measures.items()}
+        return {"name": self.names[index], "outcome": Outcome(int(self.outcome[index])).name, **row}
+
+    def write(self, folder: Path) -> list[Path]:
+        """Write results.json and results.csv into a folder, made if need be; returns their paths."""
+        folder.mkdir(parents=True, exist_ok=True)
+        summary = self.summary()
+        (folder / "results.json").write_text(json.dumps(summary, indent=1) + "\n")
+        with (folder / "results.csv").open("w", newline="") as file:
+            writer = csv.DictWriter(file, fieldnames=list(summary["scenarios"][0]))
+            writer.writeheader()
+            writer.writerows(summary["scenarios"])
+        return [folder / "results.json", folder / "results.csv"]
