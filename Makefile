@@ -28,8 +28,8 @@ clean:
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(STAMP): pyproject.toml uv.lock
-	@$(PYTHON) -c 'import sys; ok = sys.version_info >= (3, 11); \
-	sys.exit(0 if ok else "$(PYTHON) is Python %d.%d, 3.11 or newer is needed: make PYTHON=python3.11" % sys.version_info[:2])'
+	@$(PYTHON) -c 'import sys; version = sys.version_info[:2]; sys.exit(0 if version >= (3, 11) else \
+	"$(PYTHON) is Python %d.%d; 3.11 or newer is needed; try: make PYTHON=python3.11" % version)'
 	$(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check uv==$(UV_VERSION)
 	UV_PROJECT_ENVIRONMENT=.venv $(BIN)/uv sync --frozen --quiet

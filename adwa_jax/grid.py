@@ -93,8 +93,9 @@ def inflate(grid: Grid, radius: jax.Array) -> jax.Array:
     all is occupied, inflates too.
     """
     touched = occupied_lattice(grid.occupied, 2)
-    squared = squared_distance(touched)[1::2, 1::2].astype(jnp.float32)
     half_cells = 2.0 * radius / grid.resolution
+    reach = jnp.ceil(half_cells).astype(jnp.int32)
+    squared = squared_distance(touched, reach)[1::2, 1::2].astype(jnp.float32)
     return squared <= half_cells * half_cells
 
 
@@ -105,10 +106,12 @@ def occupied_lattice(occupied: jax.Array, subdivision: int) -> jax.Array:
     return ringed[:-1, :-1] | ringed[1:, :-1] | ringed[:-1, 1:] | ringed[1:, 1:]
 
 
-def squared_distance(touched: jax.Array) -> jax.Array:
+def squared_distance(touched: jax.Array, reach: jax.Array | None = None) -> jax.Array:
     """Exact squared distance, in lattice steps, from each lattice point to the nearest True one.
 
-    Two 1-D passes (Saito and Toriwaki 1994): along rows by running maxima, then along columns by the least of
+    With `reach`, [] int32, only distances up to so many steps are exact; farther points get some value above reach².
+
+    Two 1-D passes (Saito and Toriwaki 1994): along rows by counting from either side, then along columns by the least of
     k² + (row distance at ± k)², k growing until no column can improve. Needs a True on the border of every row.
 
     touched: [h, w] bool. Returns [h, w] int32.
@@ -116,11 +119,12 @@ def squared_distance(touched: jax.Array) -> jax.Array:
     h, w = touched.shape
     along_row = _distance_along_row(touched)
     far = jnp.int32(max(h, w) ** 2 * 2)
+    farthest = jnp.int32(h - 1) if reach is None else jnp.minimum(reach, h - 1)
     padded = jnp.pad(along_row * along_row, ((h, h), (0, 0)), constant_values=far)
 
     def cond_fun(carry):
         best, k = carry
-        return (k < h) & (k * k < jnp.max(best))
+        return (k <= farthest) & (k * k < jnp.max(best))
 
     def body_fun(carry):
         best, k = carry
@@ -134,11 +138,15 @@ def squared_distance(touched: jax.Array) -> jax.Array:
 
 def _distance_along_row(touched: jax.Array) -> jax.Array:
     """Steps along the row to the nearest True point, [h, w] int32."""
-    h, w = touched.shape
-    column = jnp.broadcast_to(jnp.arange(w, dtype=jnp.int32)[None, :], (h, w))
-    last = lax.cummax(jnp.where(touched, column, -w), axis=1)
-    following = lax.cummin(jnp.where(touched, column, 2 * w), axis=1, reverse=True)
-    return jnp.minimum(column - last, following - column)
+    far = jnp.full(touched.shape[:1], touched.shape[1], jnp.int32)
+
+    def body_fun(steps: jax.Array, column: jax.Array) -> tuple[jax.Array, jax.Array]:
+        steps = jnp.where(column, 0, steps + 1)
+        return steps, steps
+
+    _, from_left = lax.scan(body_fun, far, touched.T)
+    _, from_right = lax.scan(body_fun, far, touched.T, reverse=True)
+    return jnp.minimum(from_left, from_right).T
 
 
 def cell_of(grid: Grid, point: jax.Array) -> jax.Array:

@@ -51,8 +51,8 @@ def key_points(occupied: jax.Array, path: jax.Array, path_cells: jax.Array, marg
     def body_fun(index: jax.Array, kept: KeyPoints) -> KeyPoints:
         origin = kept.cells[kept.count - 1] if rule == "anchor" else points[index - 1]
         redundant = segment_free(occupied, centre(origin), centre(points[index + 1]), margin)
-        written = kept.cells.at[kept.count].set(points[index])
-        return KeyPoints(jnp.where(redundant, kept.cells, written), kept.count + (~redundant).astype(jnp.int32))
+        written = kept.cells.at[kept.count].set(points[index])  # a redundant one is written over
+        return KeyPoints(written, kept.count + (~redundant).astype(jnp.int32))
 
     first = KeyPoints(jnp.broadcast_to(points[0], points.shape).astype(jnp.int32), jnp.minimum(turns, 1))
     kept = lax.fori_loop(1, turns - 1, body_fun, first)

@@ -117,7 +117,7 @@ def _leaves(arrays: Mapping[str, np.ndarray], name: str, dtype: type, dims: tupl
     ends = np.cumsum([math.prod(shape) for shape in shapes.tolist()], dtype=object).tolist()
     if (ends[-1] if ends else 0) != len(values):
         raise ValueError(f"array '{name}' holds {len(values)} values, its shapes ask for {ends[-1] if ends else 0}")
-    starts = [0, *ends[:-1]]
+    starts = [0, *ends][: len(ends)]
     return [values[start:end].reshape(shape) for start, end, shape in zip(starts, ends, shapes.tolist(), strict=True)]
 
 

@@ -33,7 +33,8 @@ def crossing_movers(draws: Draws, occupied: np.ndarray, start: Cell, goal: Cell,
     for _ in range(spec.mover_count if len(cells) else 0):
         radius, speed = draws.uniform(*spec.mover_radius), draws.uniform(*spec.mover_speed)
         heading = draws.uniform(0.0, 2.0 * math.pi)
-        inside = (cells[draws.index(len(cells))][::-1] + draws.uniforms(2)) * resolution
+        row, column = divmod(int(cells[draws.index(len(cells))]), occupied.shape[1])
+        inside = (np.array([column, row]) + draws.uniforms(2)) * resolution
         low, high = np.full(2, radius), size - radius
         velocity = speed * np.array([math.cos(heading), math.sin(heading)])
         movers.append((radius, np.clip(inside, low, high), velocity, low, high))
@@ -50,18 +51,21 @@ def patrolling_movers(draws: Draws, occupied: np.ndarray, start: Cell, goal: Cel
 
     occupied: [H, W] bool; origin: the outer corner of cell (0, 0) [m].
     """
+    if spec.mover_count == 0:
+        return _collected([])
     closed = inflated(occupied, resolution, spec.mover_radius[1])
     cells = _far_cells(closed, start, goal, spec, resolution, slack=0.0)
     movers = []
     for _ in range(TRIES_PER_MOVER * spec.mover_count if len(cells) else 0):
         if len(movers) == spec.mover_count:
             break
-        cell, along_x, sign = cells[draws.index(len(cells))], draws.index(2), 2 * draws.index(2) - 1
+        cell = divmod(int(cells[draws.index(len(cells))]), occupied.shape[1])
+        along_x, sign = draws.index(2), 2 * draws.index(2) - 1
         radius, speed = draws.uniform(*spec.mover_radius), draws.uniform(*spec.mover_speed)
         low, high = _lane(closed, cell, along_x, resolution, origin)
         if (high - low)[1 - along_x] >= LEAST_LANE:
             velocity = sign * speed * np.array([along_x, 1 - along_x])
-            movers.append((radius, centre((cell[0], cell[1]), resolution, origin), velocity, low, high))
+            movers.append((radius, centre(cell, resolution, origin), velocity, low, high))
     return _collected(movers)
 
 
@@ -73,14 +77,16 @@ def _collected(movers: list[tuple]) -> Movers:
 
 def _far_cells(closed: np.ndarray, start: Cell, goal: Cell, spec: TaskSpec, resolution: float,
                slack: float) -> np.ndarray:
-    """[N, 2] int (row, column): open cells, farther than the mover distance + slack from start and goal."""
-    cells = np.argwhere(~closed)
+    """[N] int, row-major: open cells, farther than the mover distance + slack [m] from start and goal."""
     least = (spec.mover_distance + slack) / resolution
-    away = [np.sum((cells - end) ** 2, axis=1) > least * least for end in (start, goal)]
-    return cells[away[0] & away[1]]
+    far = ~closed
+    for row, column in (start, goal):
+        along_y, along_x = (np.arange(far.shape[0]) - row) ** 2, (np.arange(far.shape[1]) - column) ** 2
+        far &= along_y[:, None] + along_x[None, :] > least * least
+    return np.flatnonzero(far)
 
 
-def _lane(closed: np.ndarray, cell: np.ndarray, along_x: int, resolution: float,
+def _lane(closed: np.ndarray, cell: Cell, along_x: int, resolution: float,
           origin: Point) -> tuple[np.ndarray, np.ndarray]:
     """Low and high corner (x, y) [m] of the box of the mover's centre in the lane through a cell.
 

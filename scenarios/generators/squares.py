@@ -22,6 +22,8 @@ def place_squares(draws: Draws, occupied: np.ndarray, blocked: np.ndarray, start
     occupied, blocked: [H, W] bool, the known map and the cells that it denies the robot; start and goal are
     connected.
     """
+    if spec.squares == 0:
+        return squares_of([], spec.square_half_width)
     free = np.flatnonzero(_allowed(occupied, start, goal, spec.square_distance / resolution))
     shape = footprint(resolution, spec.robot_radius, spec.square_half_width)
     taken, chosen = blocked, []

@@ -6,20 +6,20 @@ from math import sqrt
 import numpy as np
 
 
-def squared_gap(x, y, row, column):
-    """Squared distance from a point to the closed square of one cell; exact for Fractions and ints."""
-    dx = max(column - x, 0, x - column - 1)
-    dy = max(row - y, 0, y - row - 1)
+def squared_gap(x, y, row, column, side=1):
+    """Squared distance from a point to the closed square of one cell of that side; exact for Fractions and ints."""
+    dx = max(column * side - x, 0, x - (column + 1) * side)
+    dy = max(row * side - y, 0, y - (row + 1) * side)
     return dx * dx + dy * dy
 
 
-def squared_distance(occupied, x, y):
+def squared_distance(occupied, x, y, side=1):
     """Squared distance from a point to the nearest occupied square or to the map's border, 0 beyond it."""
     height, width = occupied.shape
-    to_border = min(x, y, width - x, height - y)
+    to_border = min(x, y, width * side - x, height * side - y)
     if to_border <= 0:
         return 0
-    gaps = [squared_gap(x, y, int(row), int(column)) for row, column in np.argwhere(occupied)]
+    gaps = [squared_gap(x, y, row, column, side) for row, column in np.argwhere(occupied).tolist()]
     return min([*gaps, to_border * to_border])
 
 
@@ -32,8 +32,7 @@ def lattice_distance(occupied, subdivision):
     """[H·s + 1, W·s + 1] distances in cells at the lattice points, each from an exact squared distance."""
     height, width = occupied.shape
     return np.array([
-        [sqrt(squared_distance(occupied, Fraction(j, subdivision), Fraction(i, subdivision)))
-         for j in range(width * subdivision + 1)]
+        [sqrt(squared_distance(occupied, j, i, subdivision)) / subdivision for j in range(width * subdivision + 1)]
         for i in range(height * subdivision + 1)
     ])
 

@@ -36,7 +36,7 @@ def test_every_cell_equals_counting(occupied):
 def test_vmap_over_goals_equals_a_loop():
     world = grid_of(drawn("#....", ".##..", "....#"))
     goals = jnp.int32([[0, 1], [2, 3], [1, 0]])
-    together = jax.vmap(obstacle_density, (None, 0))(world, goals)
+    together = jax.jit(jax.vmap(obstacle_density, (None, 0)))(world, goals)
     for k, goal in enumerate(goals):
         alone = densities(world, goal)
         jax.tree.map(np.testing.assert_array_equal, jax.tree.map(lambda a, k=k: a[k], together), alone)

@@ -1,6 +1,7 @@
 """One decision against the double-precision oracle and by hand."""
 
 import math
+from functools import cache
 
 import chex
 import jax
@@ -80,13 +81,18 @@ def random_scene(seed):
     return occupied, (*here, *motion), known, seen, tuple(random.uniform(0, 12, 2)), tuple(random.uniform(0, 12, 2))
 
 
+@cache
+def scene_lattice(seed):
+    return distance_reference.lattice_distance(random_scene(seed)[0], SUBDIVISION)
+
+
 @pytest.mark.parametrize("normalisation", ["sum", "minmax", "none"])
 def test_decisions_equal_the_oracle(normalisation):
     options = DwaOptions(5, 7, 6, normalisation)
     chosen, braking = 0, 0
     for seed in range(24):
         occupied, start, known, seen, local, goal = random_scene(seed)
-        lattice = distance_reference.lattice_distance(occupied, SUBDIVISION)
+        lattice = scene_lattice(seed)
         expected = reference.decide(
             start[:3], start[3], start[4], local, goal, ORACLE_ROBOT, reference.Weights(*WEIGHTS),
             static_distance=lambda x, y, grid=lattice: looked_up(grid, x, y), squares=known, movers=seen, dt=DT,
@@ -102,6 +108,7 @@ def test_decisions_equal_the_oracle(normalisation):
 
 
 def assert_candidates_agree(found, expected):
+    found = jax.tree.map(np.asarray, found)
     for n, candidate in enumerate(expected):
         index = divmod(n, 7)
         assert float(found.v[index[0]]) == pytest.approx(candidate.v, abs=1e-6)
@@ -209,24 +216,28 @@ def test_no_nan_even_on_the_target_or_without_any_candidate(normalisation, known
         assert finite(choose(state(6, 6, 0, v, 0), target, target, known=known, options=options))
 
 
-@pytest.mark.parametrize("normalisation", ["sum", "minmax", "none"])
-@pytest.mark.parametrize("place", [(6.0, 6.0), (5.0, 5.0), (0.0, 0.0), (5.0, 5.5), (4.0, 6.0)])
-def test_gradients_of_scores_are_finite(normalisation, place):
+PLACES = ((6.0, 6.0), (5.0, 5.0), (0.0, 0.0), (5.0, 5.5), (4.0, 6.0), (2.0, 9.0))
+
+
+def test_gradients_of_scores_and_commands_are_finite():
     occupied = np.zeros((12, 12), bool)
     occupied[5, 5] = True  # the places: its corners, its side, the map's corner, free ground
     field = field_of(grid_of(occupied), subdivision=SUBDIVISION)
-    known = sensed(squares=[((3.0, 6.0), 1.0)], movers=[(place, (0.0, 0.0), 0.2)])
-    options = DwaOptions(5, 7, 6, normalisation)
 
-    def best_score(robot_state, weights, target):
+    def outputs(robot_state, weights, target, mover):
+        known = sensed(squares=[((3.0, 6.0), 1.0)])._replace(position=jnp.broadcast_to(mover, (3, 2)),
+                                                             seen=jnp.array([True, False, False]))
         found = decide(robot_state, target, target, field, known, weights, ROBOT, jnp.float32(CAP), jnp.float32(DT),
-                       options)
-        return jnp.sum(jnp.where(found.candidates.admissible, found.candidates.score, 0.0)) + found.yaw_rate + found.v
+                       OPTIONS)
+        score = jnp.sum(jnp.where(found.candidates.admissible, found.candidates.score, 0.0))
+        return jnp.stack([score, found.v, found.yaw_rate])
 
-    slopes = jax.grad(best_score, argnums=(0, 1, 2))
+    slopes = jax.jit(jax.jacrev(outputs, argnums=(0, 1, 2, 3)))
     weights = ScoreWeights(*map(jnp.float32, WEIGHTS))
-    assert finite(slopes(state(*place, 0.0, 0.0, 0.0), weights, jnp.float32(place)))
-    assert finite(slopes(state(*place, 0.7, 0.5, 0.2), weights, jnp.float32([9.0, 9.0])))
+    for place in PLACES:
+        here = jnp.float32(place)
+        assert finite(slopes(state(*place, 0.7, 0.5, 0.2), weights, jnp.float32([9.0, 9.0]), here))
+        assert finite(slopes(state(*place, 0.0, 0.0, 0.0), weights, here, jnp.float32([9.0, 9.0])))
 
 
 def test_padding_of_obstacles_and_map_changes_nothing():

@@ -77,7 +77,7 @@ def test_vmapped_fields_equal_single_ones():
               enumerate([((9, 9), 0.0), ((12, 10), 0.3), ((5, 12), 0.05), ((12, 10), 0.9)])]
     grids = [grid_of(world) for world in worlds]
     stacked = jax.tree.map(lambda *leaves: jnp.stack(leaves), *grids)
-    together = jax.vmap(lambda world: distance_field(world, 2).distance)(stacked)
+    together = jax.jit(jax.vmap(lambda world: distance_field(world, 2).distance))(stacked)
     for world_grid, field in zip(grids, together, strict=True):
         np.testing.assert_array_equal(field, field_of(world_grid, subdivision=2).distance)
 
@@ -129,7 +129,7 @@ def test_gradient_of_lookup_is_finite_everywhere():
     field = field_of(grid_of(CORNER), subdivision=4)
     steps = np.arange(-2, 36, dtype=np.float32) / 8.0  # lattice lines, corners of the square, off-map points
     x, y = (jnp.asarray(axis.ravel()) for axis in np.meshgrid(steps, steps))
-    slopes = jax.vmap(jax.grad(clearance_at, argnums=(1, 2)), (None, 0, 0))(field, x, y)
+    slopes = jax.jit(jax.vmap(jax.grad(clearance_at, argnums=(1, 2)), (None, 0, 0)))(field, x, y)
     assert all(np.isfinite(slope).all() for slope in slopes)
     assert float(slopes[0][jnp.argmax((x == 2.125) & (y == 1.5))]) == 1.0  # away from the side
 

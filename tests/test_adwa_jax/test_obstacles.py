@@ -40,6 +40,7 @@ def movers(*each):
 
 
 states_at = jax.jit(movers_at)
+sensed = jax.jit(sense)
 
 
 @pytest.mark.parametrize(("time", "x", "speed"), [
@@ -113,8 +114,8 @@ SQUARES = UnknownSquares(
 
 def sensed_from(position, known, sensor_range):
     world = movers({"position": (0.0, 3.0)}, {"position": (0.0, 9.0)}, {"valid": False}, {"track": TRACK})
-    return sense(SQUARES, jnp.asarray(known), world, movers_at(world, jnp.float32(0.5)), jnp.float32(position),
-                 jnp.float32(sensor_range))
+    return sensed(SQUARES, jnp.asarray(known), world, states_at(world, jnp.float32(0.5)), jnp.float32(position),
+                  jnp.float32(sensor_range))
 
 
 def test_range_is_measured_to_the_outline_and_touching_it_counts():
@@ -162,9 +163,9 @@ def test_movers_are_met_where_they_will_be():
 def test_nothing_known_is_far_away_and_finite():
     nothing = KNOWN._replace(square_known=jnp.array([False, False]), seen=jnp.array([False, False]))
     none_at_all = Sensed(*(leaf[:0] for leaf in KNOWN))
-    for sensed in (nothing, none_at_all):
-        for distance in (clearance_to_squares(sensed, jnp.float32([0.0]), jnp.float32([0.0])),
-                         clearance_to_movers(sensed, jnp.float32([0.0]), jnp.float32([0.0]), jnp.float32(1.0))):
+    for known in (nothing, none_at_all):
+        for distance in (clearance_to_squares(known, jnp.float32([0.0]), jnp.float32([0.0])),
+                         clearance_to_movers(known, jnp.float32([0.0]), jnp.float32([0.0]), jnp.float32(1.0))):
             assert np.isfinite(distance).all()
             assert (distance > 1e4).all()
 
@@ -196,7 +197,7 @@ def test_many_obstacles_equal_few_of_them():
 def test_gradients_are_finite_on_corners_inside_and_at_the_centre_of_a_mover():
     points = jnp.float32([(2.5, 0.5), (3.5, 1.5), (3.0, 1.0), (2.5, 1.0), (5.0, 0.0), (0.0, 0.0), (3.0, 1.5)])
     for clearance in (clearance_to_squares, lambda s, x, y: clearance_to_movers(s, x, y, jnp.float32(0.0))):
-        slopes = jax.vmap(jax.grad(lambda p, f=clearance: f(KNOWN, p[0], p[1])))(points)
+        slopes = jax.jit(jax.vmap(jax.grad(lambda p, f=clearance: f(KNOWN, p[0], p[1]))))(points)
         assert np.isfinite(slopes).all()
     away = jax.grad(lambda x: clearance_to_squares(KNOWN, x, jnp.float32(1.0)))(jnp.float32(5.0))
     assert float(away) == 1.0

@@ -10,8 +10,8 @@ from adwa_jax.grid import Grid
 SHAPE = (12, 12)
 SIZES = ((9, 9), (12, 10), (5, 12))
 
-few_examples = settings(max_examples=25, deadline=None, derandomize=True)
-many_examples = settings(max_examples=80, deadline=None, derandomize=True)
+few_examples = settings(max_examples=15, deadline=None, derandomize=True)
+many_examples = settings(max_examples=50, deadline=None, derandomize=True)
 
 
 def drawn(*rows):
