@@ -59,11 +59,11 @@ def draw_scenario(scenario: Scenario, ax: "Axes | None" = None, y_down: bool = F
     Movers are drawn to scale, as discs; an arrowhead ends each one's way. Unbatched; padding is not drawn.
     """
     ax = draw_map(scenario.grid, ax, y_down)
+    draw_ends(scenario, ax)
     draw_squares(scenario.squares, ax)
     ways = mover_ways(scenario.movers, seconds)
     draw_movers(ways[0], np.asarray(scenario.movers.radius), ax)
     draw_mover_ways(ways, ax)
-    draw_ends(scenario, ax)
     if legend:
         legend_below(ax)
     return ax
@@ -168,8 +168,11 @@ def new_figure(size: tuple[float, float]) -> "Figure":
 
 def legend_below(ax: "Axes", columns: int = 3) -> None:
     """A legend under the x axis, where it hides nothing."""
-    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=columns, fontsize=FONT - 1, frameon=False,
-              handler_map=_handlers())
+    from matplotlib.transforms import ScaledTranslation
+
+    below_labels = ax.transAxes + ScaledTranslation(0.0, -0.42, ax.get_figure(root=True).dpi_scale_trans)
+    ax.legend(loc="upper center", bbox_to_anchor=(0.5, 0.0), bbox_transform=below_labels, borderaxespad=0.0,
+              ncols=columns, fontsize=FONT - 1, frameon=False, handler_map=_handlers())
 
 
 def figure_legend(figure: "Figure", axes: Sequence["Axes"]) -> None:
@@ -188,8 +191,12 @@ def _draw_tile(scenario: Scenario, name: str, ax: "Axes") -> None:
     left, right, bottom, top = extent(scenario.grid)
     ax.set(xticks=[], yticks=[], xlabel="", ylabel="")
     ax.set_title(f"{name}\n{right - left:.3g} m × {top - bottom:.3g} m", fontsize=FONT - 2)
-    for line in ax.lines:  # marks sized for a page, shown on a stamp
-        line.set_markersize(line.get_markersize() * 0.6)
+    for line in ax.lines:  # drawn for a page, shown on a stamp
+        line.set(markersize=line.get_markersize() * 0.6, markeredgewidth=0.5)
+    for cell_lines in ax.collections:
+        cell_lines.set_linewidth(0.2)
+    for patch in ax.patches:
+        patch.set_linewidth(0.5)
 
 
 def _draw_head(way: np.ndarray, ax: "Axes") -> None:

@@ -129,7 +129,7 @@ def load_suite(path: str | Path) -> Suite:
         return Suite(str(header["name"]), scenarios, names, dict(header["recipe"]))
     except InputError:
         raise
-    except (OSError, EOFError, ValueError, KeyError, TypeError, MemoryError, NotImplementedError, zlib.error,
+    except (OSError, EOFError, ValueError, KeyError, TypeError, MemoryError, RuntimeError, zlib.error,
             zipfile.BadZipFile) as error:
         raise _refusal(path, f"damaged or no suite ({_line(error)})", "must be a whole file that save_suite wrote",
                        "copy it again or make it again") from None

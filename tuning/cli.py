@@ -14,6 +14,7 @@ from typing import Annotated, Any
 import jax
 import numpy as np
 import typer
+from rich import box
 from rich.console import Console
 from rich.table import Table
 
@@ -105,7 +106,7 @@ def plan_command(
     records = [as_json(answer, map_file.to_world, listed, scen is not None)
                for answer, listed in zip(answers, expected, strict=True)]  # fmt: skip
     _write_json(records, json_file)
-    if not quiet and str(json_file) != "-":
+    if not quiet and str(json_file) != "-" and any(answer.status == Status.FOUND for answer in answers):
         Console().print(_plans_table(records))
     if figure:
         _draw_plan(figure, grid, map_file, answers[0], planner.value)
@@ -285,7 +286,7 @@ def _suite_from_file(path: Path) -> Suite:
 def _grid(map_file: MapFile, unknown: UnknownPolicy, quiet: bool) -> Grid:
     if not quiet and map_file.unknown.any():
         share = f"{map_file.unknown_share:.1%} of {map_file.name} is unknown"
-        stderr().print(f"{share} and counts as {unknown.value} (--unknown)", highlight=False)
+        stderr().print(f"{share} and counts as {unknown.value} (--unknown)", highlight=False, soft_wrap=True)
     return map_file.grid(unknown.value)
 
 
@@ -332,11 +333,24 @@ def _require_length(option: str, value: float) -> None:
 def _write_json(content: Any, path: Path | None) -> None:
     if path is None:
         return
-    text = json.dumps(content, indent=1) + "\n"
+    text = _json_text(content) + "\n"
     if str(path) == "-":
         sys.stdout.write(text)
     else:
         _parent_made(path).write_text(text)
+
+
+def _json_text(content: Any) -> str:
+    """A list with one object a line, an object with one field a line: paths stay readable."""
+    if isinstance(content, list):
+        return "[\n" + ",\n".join(json.dumps(item) for item in content) + "\n]"
+    lines = [f" {json.dumps(key)}: {_json_text(value) if _is_rows(value) else json.dumps(value)}"
+             for key, value in content.items()]  # fmt: skip
+    return "{\n" + ",\n".join(lines) + "\n}"
+
+
+def _is_rows(value: Any) -> bool:
+    return isinstance(value, list) and bool(value) and isinstance(value[0], dict)
 
 
 def _parent_made(path: Path) -> Path:
@@ -346,15 +360,17 @@ def _parent_made(path: Path) -> Path:
 
 def _plans_table(records: list[dict[str, Any]], most: int = 20) -> Table:
     counts = {status.name: sum(record["status"] == status.name for record in records) for status in Status}
-    table = Table(title=", ".join(f"{count} {name}" for name, count in counts.items() if count), title_justify="left")
-    columns = ("status", "length", "expected", "expansions", "breaking_points", "danger_points", "key_point_length")
-    shown = [name for name in columns if name in records[0]]
-    table.add_column("start")
-    table.add_column("goal")
-    for name in shown:
-        table.add_column(name.replace("_", " ") + (" [m]" if "length" in name else ""), justify="right")
+    title = ", ".join(f"{count} {name}" for name, count in counts.items() if count)
+    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    columns = {"status": "status", "length": "length", "expected": "listed", "expansions": "expanded",
+               "breaking_points": "turns", "danger_points": "danger", "key_point_length": "key-point"}  # fmt: skip
+    shown = {name: heading for name, heading in columns.items() if name in records[0]}
+    table.add_column("start", no_wrap=True)
+    table.add_column("goal", no_wrap=True)
+    for heading in shown.values():
+        table.add_column(heading, justify="right", no_wrap=True)
     for record in records[:most]:
-        points = [f"{record[end][0]:g}, {record[end][1]:g}" for end in ("start", "goal")]
+        points = [f"{record[end][0]:g},{record[end][1]:g}" for end in ("start", "goal")]
         table.add_row(*points, *(_cell(record[name]) for name in shown))
     if len(records) > most:
         table.caption = f"{len(records) - most} more (--json has them all)"

@@ -20,6 +20,7 @@ from adwa_jax.presets import paper
 from scenarios.padding import ladder_size, pad_grid
 
 Planner = Literal["improved", "traditional", "dijkstra"]
+DECIMALS = 4  # of coordinates in JSON: a tenth of a millimetre, beyond which float32 on a map of 1 km knows nothing
 WORKERS = 2  # searches side by side; one alone keeps one core busy
 
 
@@ -82,17 +83,16 @@ def plan_paths(grid: Grid, queries: np.ndarray, constants: Constants, options: P
     rows, columns = (ladder_size(side) for side in grid.occupied.shape)
     padded = jax.device_put(pad_grid(grid, rows, columns))
     constants = jax.tree.map(np.float32, constants)
-    points = np.asarray(queries, np.float32)
     with ThreadPoolExecutor(WORKERS) as pool:
-        answers = pool.map(partial(_answer, padded, constants, options), points)
+        answers = pool.map(partial(_answer, padded, constants, options), np.asarray(queries, np.float64))
         for done, answer in enumerate(answers, start=1):
             if progress:
-                progress(done, len(points))
+                progress(done, len(queries))
             yield answer
 
 
 def _answer(grid: Grid, constants: Constants, options: PlanOptions, query: np.ndarray) -> PlannedPath:
-    found = jax.device_get(_plan(grid, jnp.asarray(query), constants, options))
+    found = jax.device_get(_plan(grid, jnp.asarray(query, jnp.float32), constants, options))
     search = found.search
     cells = search.path[: search.path_cells]
     resolution, origin = float(grid.resolution), np.asarray(grid.origin)
@@ -120,7 +120,7 @@ def as_json(answer: PlannedPath, to_world: Callable[[np.ndarray], np.ndarray], e
     """The command line's JSON object for one query, in the world's frame; `expected` where the file lists one."""
 
     def world(points: Any) -> list:
-        return np.round(to_world(np.asarray(points, np.float64)), 6).tolist()
+        return np.round(to_world(np.asarray(points, np.float64)), DECIMALS).tolist()
 
     record = {
         "start": world(answer.start),

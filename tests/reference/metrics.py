@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from fractions import Fraction
 
 import numpy as np
 
@@ -102,7 +103,7 @@ def occupied_corners(occupied):
             for row, column in np.argwhere(occupied) for i in (0, 1) for j in (0, 1)}
 
 
-def polyline_danger_points(occupied, points, reach=0.1):
+def polyline_danger_points(occupied, points, reach=Fraction(1, 10)):
     """Corners of occupied cells closer than `reach` cells to a polyline of points (x, y) in cells."""
     segments = list(itertools.pairwise(points)) or [(points[0], points[0])]
     return sum(any(squared_point_to_segment(corner, a, b) < reach * reach for a, b in segments)
