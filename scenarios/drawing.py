@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import jax
 import numpy as np
+from numpy.typing import ArrayLike
 
 from adwa_jax.grid import Grid
 from adwa_jax.obstacles import movers_at
@@ -59,7 +60,7 @@ def draw_scenario(scenario: Scenario, ax: "Axes | None" = None, y_down: bool = F
     Movers are drawn to scale, as discs; an arrowhead ends each one's way. Unbatched; padding is not drawn.
     """
     ax = draw_map(scenario.grid, ax, y_down)
-    draw_ends(scenario, ax)
+    draw_ends(scenario.start[:2], scenario.goal, ax)
     draw_squares(scenario.squares, ax)
     ways = mover_ways(scenario.movers, seconds)
     draw_movers(ways[0], np.asarray(scenario.movers.radius), ax)
@@ -124,23 +125,23 @@ def draw_movers(position: np.ndarray, radius: np.ndarray, ax: "Axes", label: str
     return patches
 
 
-def draw_mover_ways(ways: np.ndarray, ax: "Axes") -> list[Any]:
-    """A line for each mover along ways [T, M, 2], with an arrowhead where it ends; returns the lines."""
+def draw_mover_ways(ways: np.ndarray, ax: "Axes", heads: bool = True) -> list[Any]:
+    """A line for each mover along ways [T, M, 2], with an arrowhead where it ends if `heads`; returns the lines."""
     lines = []
     for way in np.swapaxes(ways, 0, 1):
         if np.isfinite(way).any():
             lines += ax.plot(way[:, 0], way[:, 1], color=BLUE, linewidth=0.9, zorder=2.5, solid_joinstyle="round",
                              label=_once("way of a mover", lines))
-            _draw_head(way[np.isfinite(way).all(axis=1)], ax)
+            if heads:
+                _draw_head(way[np.isfinite(way).all(axis=1)], ax)
     return lines
 
 
-def draw_ends(scenario: Scenario, ax: "Axes") -> None:
-    """Start and goal."""
-    start, goal = np.asarray(scenario.start), np.asarray(scenario.goal)
+def draw_ends(start: ArrayLike, goal: ArrayLike, ax: "Axes") -> None:
+    """Start and goal, (x, y) [m]; NaN is not drawn."""
     marker = {"linestyle": "none", "markeredgecolor": BLACK, "zorder": 8}
-    ax.plot(*start[None, :2].T, marker="o", markersize=8, markerfacecolor=GREEN, label="start", **marker)
-    ax.plot(*goal[None].T, marker="*", markersize=13, markerfacecolor=VERMILLION, label="goal", **marker)
+    ax.plot(*np.reshape(start, (2, 1)), marker="o", markersize=8, markerfacecolor=GREEN, label="start", **marker)
+    ax.plot(*np.reshape(goal, (2, 1)), marker="*", markersize=13, markerfacecolor=VERMILLION, label="goal", **marker)
 
 
 def mover_ways(movers: Movers, seconds: float) -> np.ndarray:

@@ -17,3 +17,12 @@ def data_folder() -> Path:
     if not DATA_FOLDER.is_dir():
         pytest.skip(f"real data absent: {DATA_FOLDER} is not a folder")
     return DATA_FOLDER
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--every-query", action="store_true", help="check every MovingAI query, on large maps too (minutes)")
+
+
+@pytest.fixture(scope="session")
+def every_query(request: pytest.FixtureRequest) -> bool:
+    return request.config.getoption("--every-query")

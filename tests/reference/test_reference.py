@@ -271,7 +271,7 @@ class TestMetrics:
         # The straight line from (0.5, 0.5) to (2.5, 2.5) passes through corners (1, 1) and (2, 2).
         assert metrics.polyline_danger_points(occupied, [(0.5, 0.5), (2.5, 2.5)]) == 2
         assert metrics.polyline_danger_points(occupied, [(0.5, 0.5), (0.5, 3.5)]) == 0
-        # x-2y-ish line of slope 3/4 through (0.5, 0.5): exactly 0.1 from (1, 1), which is not closer than 0.1.
+        # A line of slope 3/4 from (0.5, 0.5) is exactly 0.1 from (1, 1), which is not closer than 0.1.
         end = (Fraction(9, 2), Fraction(7, 2))
         half = Fraction(1, 2)
         assert metrics.polyline_danger_points(drawn("....", ".#..", "....", "...."), [(half, half), end]) == 0

@@ -1,0 +1,342 @@
+"""The paper's figures and what goes with them: plans, drives, an animation, success rates.
+
+Results in, matplotlib figures out; nothing is computed here that a kernel computes. Conventions: `scenarios.drawing`.
+Dimension letters: P path cells; Q key points; T control steps; M movers.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+
+import jax
+import numpy as np
+
+from adwa_jax.astar import Status
+from adwa_jax.grid import Grid
+from adwa_jax.keypoints import KeyPoints, turning_points
+from adwa_jax.metrics import danger_corners, danger_steps
+from adwa_jax.plan import Plan
+from adwa_jax.scenario import Scenario
+from adwa_jax.simulate import Episode, Outcome, Trace
+from scenarios.drawing import (
+    BLACK,
+    BLUE,
+    FONT,
+    ORANGE,
+    SKY,
+    VERMILLION,
+    draw_ends,
+    draw_map,
+    draw_mover_ways,
+    draw_movers,
+    draw_squares,
+    figure_legend,
+    legend_below,
+    mover_ways,
+    new_figure,
+)
+from tuning.intervals import wilson
+from tuning.planning import PlannedPath
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Route = Literal["path", "key points"]
+PAPER_SUCCESS = 0.956  # §3.4
+SENTENCES = {
+    Outcome.REACHED: "reached the goal",
+    Outcome.HIT_KNOWN: "hit a known obstacle",
+    Outcome.HIT_UNKNOWN: "hit an unknown square",
+    Outcome.HIT_MOVER: "hit a mover",
+    Outcome.STUCK: "got stuck",
+    Outcome.TIMEOUT: "ran out of time",
+    Outcome.NO_PATH: "found no path",
+}
+COLLISIONS = (Outcome.HIT_KNOWN, Outcome.HIT_UNKNOWN, Outcome.HIT_MOVER)
+
+
+class Comparison(NamedTuple):
+    """Two plans on one map."""
+
+    name: str
+    grid: Grid
+    traditional: Plan | PlannedPath
+    improved: Plan | PlannedPath
+
+
+def plan_figure(grid: Grid, plan: Plan | PlannedPath, planner: str = "A*", y_down: bool = False,
+                ax: "Axes | None" = None) -> "Figure":
+    """One plan: grid path, turning points and danger points, and its key-point polyline. Unbatched.
+
+    planner: named in the title, with length, breaking points and danger points of both.
+    """
+    planned = planned_path(grid, plan)
+    ax = draw_map(grid, ax, y_down)
+    draw_ends(planned.start, planned.goal, ax)
+    _draw_route(grid, planned, "path", ax)
+    if len(planned.key_points):
+        _draw_polyline(planned.key_points, ax, linestyle="--")
+    names = {"path": "path: ", "key points": "key points: "} if len(planned.path) else {"path": ""}
+    lines = [prefix + route_sentence(planned, route) for route, prefix in names.items()]  # pyright: ignore
+    ax.set_title("\n".join([planner, *lines]), fontsize=FONT)
+    legend_below(ax)
+    return figure_of(ax)
+
+
+def compare_plans(comparisons: Sequence[Comparison], axes: Any = None, y_down: bool = False) -> "Figure":
+    """Fig. 3: the traditional A*'s grid path and the improved A*'s key points, each with its danger points ringed.
+
+    One map: side by side; several: a column each, the traditional above the improved. axes: an array of such a shape.
+    """
+    several = len(comparisons) > 1
+    shape = (2, len(comparisons)) if several else (1, 2)
+    figure = None
+    if axes is None:
+        figure = new_figure((3.6 * shape[1], 3.95 * shape[0] + 0.4))
+        axes = figure.subplots(*shape, squeeze=False)
+    axes = np.asarray(axes).reshape(shape)
+    pairs = axes.T if several else axes
+    for comparison, (above, below) in zip(comparisons, pairs, strict=True):
+        name = f"{comparison.name}, " if comparison.name else ""
+        _draw_panel(comparison.grid, comparison.traditional, "path", f"{name}traditional A*", above, y_down)
+        _draw_panel(comparison.grid, comparison.improved, "key points", f"{name}improved A*", below, y_down)
+    if figure is not None:
+        figure_legend(figure, axes.ravel().tolist())
+    return figure_of(axes.flat[0])
+
+
+def drive_figure(scenario: Scenario, plan: Plan, episode: Episode, trace: Trace, title: str = "",
+                 ax: "Axes | None" = None, y_down: bool = False, legend: bool = True) -> "Figure":
+    """Fig. 4: planned polyline dashed, driven path solid, key points, unknown squares, movers and the ways they took.
+
+    Movers are filled where they were when the episode ended and pale where they began; squares the robot never sensed
+    are pale too. A collision is crossed. Unbatched; the plan and trace may be padded. title: put before the outcome.
+    """
+    ax = draw_map(scenario.grid, ax, y_down)
+    steps, seconds = int(trace.length), float(episode.measures.time)
+    ways = driven_ways(scenario, trace)
+    radius = np.asarray(scenario.movers.radius)
+    draw_ends(scenario.start[:2], scenario.goal, ax)
+    _draw_sensed_squares(scenario, np.asarray(trace.known)[steps - 1] if steps else None, ax)
+    pale = {"alpha": 0.35, "linestyle": ":", "zorder": 3.2}
+    draw_movers(ways[0], radius, ax, "mover at the start", **pale)
+    draw_movers(ways[-1], radius, ax, "mover at the end")
+    draw_mover_ways(ways, ax, heads=False)
+    _draw_plan_of(plan, ax)
+    path = driven_path(scenario, trace)
+    ax.plot(*path.T, color=VERMILLION, linewidth=2.0, zorder=6, label="driven path", solid_joinstyle="round")
+    _draw_last(path[-1], Outcome(int(episode.outcome)), ax)
+    ax.set_title(f"{_prefixed(title)}{drive_sentence(plan, episode, seconds)}", fontsize=FONT)
+    if legend:
+        legend_below(ax)
+    return figure_of(ax)
+
+
+def success_figure(rates: Mapping[str, tuple[int, int]], paper: float | None = PAPER_SUCCESS,
+                   ax: "Axes | None" = None) -> "Figure":
+    """Bars of success rates with their 95 % Wilson intervals; the paper's rate is a dashed line.
+
+    rates: name -> (successes, scenarios).
+    """
+    if ax is None:
+        ax = new_figure((1.1 * len(rates) + 1.9, 3.2)).subplots()
+    place = np.arange(len(rates))
+    share = np.array([successes / max(count, 1) for successes, count in rates.values()])
+    low, high = np.array([wilson(successes, count) for successes, count in rates.values()]).T
+    ax.bar(place, 100 * share, width=0.6, color=SKY, edgecolor=BLACK, linewidth=0.8, zorder=2)
+    ax.errorbar(place, 100 * share, 100 * np.array([share - low, high - share]), fmt="none", ecolor=BLACK,
+                capsize=4, zorder=3)
+    for x, (successes, count) in zip(place, rates.values(), strict=True):
+        ax.text(x, 3, f"{successes / max(count, 1):.1%}\n{successes} of {count}", ha="center", va="bottom",
+                fontsize=FONT - 1, zorder=4)
+    if paper is not None:
+        ax.axhline(100 * paper, color=VERMILLION, linestyle="--", linewidth=1.5, zorder=1,
+                   label=f"paper: {paper:.1%} in “the test scenario”")
+    ax.set_xticks(place, list(rates), fontsize=FONT)
+    ax.set(ylim=(0, 104), xlim=(-0.6, len(rates) - 0.4))
+    ax.set_ylabel("success rate [%], 95 % interval", fontsize=FONT)
+    ax.tick_params(labelsize=FONT - 1)
+    if paper is not None:
+        legend_below(ax, columns=1)
+    return figure_of(ax)
+
+
+def planned_path(grid: Grid, plan: Plan | PlannedPath) -> PlannedPath:
+    """What is drawn of a plan; a `PlannedPath` passes unchanged. Points [m] in the grid's frame."""
+    if isinstance(plan, PlannedPath):
+        return plan
+    cells = np.asarray(plan.search.path)[: int(plan.search.path_cells)]
+    path = (cells[:, ::-1] + 0.5) * float(grid.resolution) + np.asarray(grid.origin)
+    ends = [tuple(path[end].tolist()) if len(path) else (np.nan, np.nan) for end in (0, -1)]
+    return PlannedPath(
+        start=ends[0],
+        goal=ends[1],
+        status=Status(int(plan.search.status)),
+        length=float(plan.length),
+        expansions=int(plan.search.expansions),
+        measures={name: int(value) for name, value in plan.measures._asdict().items()},
+        path=path.astype(np.float32),
+        key_points=np.asarray(plan.key_points)[: int(plan.key_point_count)],
+        key_point_length=float(plan.key_point_length),
+    )
+
+
+def danger_points(grid: Grid, planned: PlannedPath, route: Route) -> np.ndarray:
+    """[D, 2] (x, y) [m]: where the route passes too close to obstacles; as many as its measure of danger points.
+
+    `path`: the corners at which diagonal steps pass an occupied cell. `key points`: the corners of occupied cells
+    nearer than a tenth of a cell to the polyline.
+    """
+    points = planned.path if route == "path" else planned.key_points
+    if len(points) < 2:
+        return np.zeros((0, 2), np.float32)
+    grid, cells, count = _on_device(grid, _cells_of(grid, points), np.int32(len(points)))
+    if route == "path":
+        return ((points[:-1] + points[1:]) / 2)[np.asarray(danger_steps(grid, cells, count))]
+    corners = np.argwhere(np.asarray(danger_corners(grid, KeyPoints(cells, count))))
+    return corners[:, ::-1] * float(grid.resolution) + np.asarray(grid.origin)
+
+
+def driven_path(scenario: Scenario, trace: Trace) -> np.ndarray:
+    """[T + 1, 2] (x, y) [m]: the start, then where the robot was after each control step."""
+    steps = int(trace.length)
+    driven = np.stack([np.asarray(trace.robot.x)[:steps], np.asarray(trace.robot.y)[:steps]], axis=-1)
+    return np.concatenate([np.asarray(scenario.start)[None, :2], driven])
+
+
+def driven_ways(scenario: Scenario, trace: Trace) -> np.ndarray:
+    """[T + 1, M, 2] (x, y) [m]: where the movers were at the start and after each step; NaN while absent."""
+    steps, movers = int(trace.length), len(np.asarray(scenario.movers.valid))
+    position = np.asarray(trace.movers.position)[:steps, :movers]
+    present = np.asarray(trace.movers.present)[:steps, :movers]
+    later = np.where(present[..., None], position, np.float32(np.nan))
+    return np.concatenate([mover_ways(scenario.movers, 0.0)[:1], later])
+
+
+def route_sentence(planned: PlannedPath, route: Route) -> str:
+    """Length, breaking points and danger points, or why there is no path."""
+    if planned.status != Status.FOUND:
+        return f"no path: {planned.status.name}"
+    prefix = "" if route == "path" else "key_point_"
+    length = planned.length if route == "path" else planned.key_point_length
+    counts = [_counted(planned.measures[f"{prefix}{kind}_points"], f"{kind} point") for kind in ("breaking", "danger")]
+    return ", ".join([f"{length:.2f} m", *counts])
+
+
+def drive_sentence(plan: Plan, episode: Episode, seconds: float) -> str:
+    """How a drive ended, and in a second line what it took."""
+    outcome, measures = Outcome(int(episode.outcome)), episode.measures
+    ending = "a mover ran into the standing robot" if bool(episode.hit_while_stopped) else SENTENCES[outcome]
+    if outcome == Outcome.NO_PATH:
+        return ending
+    return (f"{ending} after {seconds:.1f} s\n{float(measures.length):.2f} m driven, "
+            f"{float(plan.key_point_length):.2f} m planned, least clearance {float(measures.least_clearance):.2f} m")
+
+
+def figure_of(ax: "Axes") -> "Figure":
+    """The figure that holds the axes."""
+    return ax.get_figure(root=True)  # pyright: ignore[reportReturnType]
+
+
+def _draw_panel(grid: Grid, plan: Plan | PlannedPath, route: Route, name: str, ax: "Axes", y_down: bool) -> None:
+    planned = planned_path(grid, plan)
+    draw_map(grid, ax, y_down)
+    draw_ends(planned.start, planned.goal, ax)
+    if route == "path":
+        _draw_route(grid, planned, route, ax)
+    else:
+        ax.plot(*planned.path.T, color=BLUE, linewidth=1.0, linestyle=":", zorder=4, label="grid path before reduction")
+        _draw_polyline(planned.key_points, ax, linestyle="-")
+        _draw_rings(grid, planned, route, ax)
+    ax.set_title(f"{name}\n{route_sentence(planned, route)}", fontsize=FONT)
+
+
+def _draw_route(grid: Grid, planned: PlannedPath, route: Route, ax: "Axes") -> None:
+    """The grid path, its turning points without the ends, and its danger points."""
+    path = planned.path
+    ax.plot(*path.T, color=BLUE, linewidth=2.2, zorder=4, label="grid path", **_haloed())
+    turning = np.asarray(turning_points(*_on_device(_cells_of(grid, path), np.int32(len(path)))))
+    ax.plot(*path[turning][1:-1].T, linestyle="none", marker="o", markersize=4.5, markerfacecolor="white", markeredgecolor=BLUE,
+            zorder=5, label="breaking point")
+    _draw_rings(grid, planned, route, ax)
+
+
+def _draw_rings(grid: Grid, planned: PlannedPath, route: Route, ax: "Axes") -> None:
+    """A ring around each danger point, wide enough to be found on a large map."""
+    points = danger_points(grid, planned, route)
+    if not len(points):
+        return
+    size = float(np.clip(0.9 * _cell_size(grid, ax), 7.0, 16.0))
+    ax.plot(*points.T, linestyle="none", marker="o", markersize=size, markerfacecolor="none", zorder=7,
+            markeredgecolor=VERMILLION, markeredgewidth=1.8, label="danger point", **_haloed())
+
+
+def _cell_size(grid: Grid, ax: "Axes") -> float:
+    """Points [pt] that a cell's side is likely to take on paper; the layout is settled later."""
+    place = ax.get_subplotspec()
+    width = figure_of(ax).get_figwidth() / (place.get_gridspec().ncols if place else 1)
+    return 72.0 * max(width - 0.8, 1.0) / max(int(grid.height), int(grid.width))
+
+
+def _draw_polyline(key_points: np.ndarray, ax: "Axes", linestyle: str) -> None:
+    """The key-point polyline, a diamond at each key point between its ends."""
+    ax.plot(*key_points.T, color=BLACK, linewidth=1.8, linestyle=linestyle, zorder=5, label="key-point path")
+    ax.plot(*key_points[1:-1].T, linestyle="none", marker="D", markersize=5.5, markerfacecolor="white",
+            markeredgecolor=BLACK, zorder=6, label="key point")
+
+
+def _draw_plan_of(plan: Plan, ax: "Axes") -> None:
+    count = int(plan.key_point_count)
+    if count:
+        key_points = np.asarray(plan.key_points)[:count]
+        ax.plot(*key_points.T, color=BLACK, linewidth=1.4, linestyle="--", zorder=5, label="planned path")
+        ax.plot(*key_points[1:-1].T, linestyle="none", marker="D", markersize=5.5, markerfacecolor="white",
+                markeredgecolor=BLACK, zorder=6.5, label="key point")
+
+
+def _draw_sensed_squares(scenario: Scenario, known: np.ndarray | None, ax: "Axes") -> list[Any]:
+    """The unknown squares, pale where `known` [S] is False; None: all pale. Returns their patches."""
+    valid = np.asarray(scenario.squares.valid)
+    patches = draw_squares(scenario.squares, ax)
+    sensed = np.zeros(len(patches), bool) if known is None else known[: len(valid)][valid]
+    for patch, seen in zip(patches, sensed, strict=True):
+        patch.set_facecolor(ORANGE if seen else "white")
+    for seen, label in ((True, "unknown square"), (False, "unknown square, not sensed")):
+        kind = [patch for patch, value in zip(patches, sensed, strict=True) if value == seen]
+        for index, patch in enumerate(kind):
+            patch.set_label("_" if index else label)
+    return patches
+
+
+def _draw_last(position: np.ndarray, outcome: Outcome, ax: "Axes") -> None:
+    """Where the robot ended, unless that was the goal."""
+    if outcome in COLLISIONS:
+        ax.plot(*position[None].T, linestyle="none", marker="X", markersize=13, markerfacecolor=VERMILLION,
+                markeredgecolor=BLACK, zorder=9, label="collision")
+    elif outcome != Outcome.REACHED:
+        ax.plot(*position[None].T, linestyle="none", marker="s", markersize=7, markerfacecolor="white",
+                markeredgecolor=VERMILLION, markeredgewidth=2.0, zorder=9, label="robot at the end")
+
+
+def _haloed() -> dict[str, Any]:
+    """A white rim, so that a line stays apart from the dark cells it crosses."""
+    from matplotlib.patheffects import withStroke
+
+    return {"path_effects": [withStroke(linewidth=3.6, foreground="white")]}
+
+
+def _cells_of(grid: Grid, points: np.ndarray) -> np.ndarray:
+    """[..., 2] int32 (row, col) of the cells that hold points (x, y) [m]."""
+    return np.floor((points - np.asarray(grid.origin)) / float(grid.resolution))[..., ::-1].astype(np.int32)
+
+
+def _on_device(*trees: Any) -> list[Any]:
+    return [jax.device_put(tree) for tree in trees]
+
+
+def _counted(count: int, noun: str) -> str:
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def _prefixed(title: str) -> str:
+    return f"{title}: " if title else ""
