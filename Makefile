@@ -19,9 +19,9 @@ lint: $(STAMP)
 	$(BIN)/ruff check
 	$(BIN)/pyright
 
-# The README's pictures.
+# The README's picture.
 figures: $(STAMP)
-	$(BIN)/python -m tuning.readme_pictures
+	$(BIN)/adwa drive --suite paper-25 --index 3 --figure notebooks/pictures/drive.png --animation out/drive.gif
 
 clean:
 	rm -rf .venv out dist .pytest_cache .ruff_cache .hypothesis .jax_cache

@@ -36,11 +36,12 @@ TRACK_STEP = 0.1  # [s] between the points of a mover's track
 def draw_map(grid: Grid, ax: "Axes | None" = None, y_down: bool = False) -> "Axes":
     """The map without its padding: free cells white, occupied ones dark; x and y in metres, y up unless `y_down`."""
     from matplotlib.colors import ListedColormap
+    from matplotlib.ticker import MaxNLocator
 
     height, width = int(grid.height), int(grid.width)
     left, right, bottom, top = extent(grid)
     if ax is None:
-        ax = new_figure(_map_size(grid, 5.0)).subplots()
+        ax = new_figure(map_size(grid)).subplots()
     ax.imshow(np.asarray(grid.occupied)[:height, :width], cmap=ListedColormap(["#FFFFFF", OCCUPIED]), vmin=0, vmax=1,
               origin="lower", extent=(left, right, bottom, top), interpolation="nearest", zorder=0)
     if max(height, width) <= MOST_CELL_LINES:
@@ -50,6 +51,8 @@ def draw_map(grid: Grid, ax: "Axes | None" = None, y_down: bool = False) -> "Axe
     ax.set_xlabel("x [m]", fontsize=FONT)
     ax.set_ylabel("y [m]", fontsize=FONT)
     ax.tick_params(labelsize=FONT - 1)
+    for axis in (ax.xaxis, ax.yaxis):
+        axis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 2, 5, 10]))
     return ax
 
 
@@ -93,7 +96,7 @@ def contact_sheet(suite: Suite | Sequence[Scenario], names: Sequence[str] | None
         tile.set_axis_off()
     heading = suite.name if isinstance(suite, Suite) else "Scenarios"
     figure.suptitle(f"{heading}: {len(shown)} of {len(scenarios)}", fontsize=FONT + 2)
-    figure_legend(figure, tiles[: len(shown)])
+    figure_legend(figure, list(tiles[: len(shown)]))
     if path is not None:
         figure.savefig(path, dpi=150)
     return figure
@@ -130,8 +133,8 @@ def draw_mover_ways(ways: np.ndarray, ax: "Axes", heads: bool = True) -> list[An
     lines = []
     for way in np.swapaxes(ways, 0, 1):
         if np.isfinite(way).any():
-            lines += ax.plot(way[:, 0], way[:, 1], color=BLUE, linewidth=0.9, zorder=2.5, solid_joinstyle="round",
-                             label=_once("way of a mover", lines))
+            lines += ax.plot(way[:, 0], way[:, 1], color=BLUE, linewidth=0.8, alpha=0.7, zorder=2.5,
+                             solid_joinstyle="round", label=_once("way of a mover", lines))
             if heads:
                 _draw_head(way[np.isfinite(way).all(axis=1)], ax)
     return lines
@@ -149,7 +152,7 @@ def mover_ways(movers: Movers, seconds: float) -> np.ndarray:
     times = np.arange(0.0, seconds + TRACK_STEP / 2, TRACK_STEP).astype(np.float32)
     if np.shape(movers.valid) == (0,):
         return np.zeros((len(times), 0, 2), np.float32)
-    states = jax.vmap(movers_at, in_axes=(None, 0))(jax.device_put(movers), times)
+    states = jax.vmap(movers_at, in_axes=(None, 0))(jax.device_put(movers), jax.device_put(times))
     return np.where(np.asarray(states.present)[..., None], np.asarray(states.position), np.float32(np.nan))
 
 
@@ -160,6 +163,12 @@ def extent(grid: Grid) -> tuple[float, float, float, float]:
     return float(x), float(x + int(grid.width) * side), float(y), float(y + int(grid.height) * side)
 
 
+def map_size(grid: Grid, width: float = 5.0, legend: float = 1.0) -> tuple[float, float]:
+    """Inches of a figure for one map with its labels, `width` wide, and a legend of that height."""
+    shape = float(np.clip(int(grid.height) / int(grid.width), 0.3, 2.0))
+    return width, (width - 0.6) * shape + 0.8 + legend
+
+
 def new_figure(size: tuple[float, float]) -> "Figure":
     """A figure of `size` inches that pyplot does not know of."""
     from matplotlib.figure import Figure
@@ -167,11 +176,16 @@ def new_figure(size: tuple[float, float]) -> "Figure":
     return Figure(figsize=size, layout="constrained")
 
 
+def figure_of(ax: "Axes") -> "Figure":
+    """The figure that holds the axes."""
+    return ax.get_figure(root=True)  # pyright: ignore[reportReturnType]
+
+
 def legend_below(ax: "Axes", columns: int = 3) -> None:
     """A legend under the x axis, where it hides nothing."""
     from matplotlib.transforms import ScaledTranslation
 
-    below_labels = ax.transAxes + ScaledTranslation(0.0, -0.42, ax.get_figure(root=True).dpi_scale_trans)
+    below_labels = ax.transAxes + ScaledTranslation(0.0, -0.42, figure_of(ax).dpi_scale_trans)
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, 0.0), bbox_transform=below_labels, borderaxespad=0.0,
               ncols=columns, fontsize=FONT - 1, frameon=False, handler_map=_handlers())
 
@@ -182,7 +196,8 @@ def figure_legend(figure: "Figure", axes: Sequence["Axes"]) -> None:
     for ax in axes:
         for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
             kinds.setdefault(label, handle)
-    columns = max(1, int(figure.get_figwidth() / 1.5))
+    rows = max(1, ceil(len(kinds) / (figure.get_figwidth() / 1.5)))
+    columns = max(1, ceil(len(kinds) / rows))
     figure.legend(list(kinds.values()), list(kinds), loc="outside lower center", ncols=columns, fontsize=FONT - 1,
                   frameon=False, handler_map=_handlers())
 
@@ -208,12 +223,6 @@ def _draw_head(way: np.ndarray, ax: "Axes") -> None:
     up = -1.0 if ax.yaxis_inverted() else 1.0
     angle = np.degrees(np.arctan2(up * back[1], back[0])) - 90.0
     ax.plot(*way[-1:].T, marker=(3, 0, angle), markersize=5, color=BLUE, linestyle="none", zorder=2.6)
-
-
-def _map_size(grid: Grid, width: float) -> tuple[float, float]:
-    """Inches of a figure for one map with labels and a legend."""
-    shape = float(np.clip(int(grid.height) / int(grid.width), 0.3, 2.0))
-    return width, (width - 0.7) * shape + 1.2
 
 
 def _once(label: str, drawn: Sequence[Any]) -> str:

@@ -30,6 +30,7 @@ from scenarios.drawing import (
     draw_movers,
     draw_squares,
     figure_legend,
+    figure_of,
     legend_below,
     mover_ways,
     new_figure,
@@ -52,6 +53,7 @@ SENTENCES = {
     Outcome.TIMEOUT: "ran out of time",
     Outcome.NO_PATH: "found no path",
 }
+PLANNERS = {"improved": "Improved A*", "traditional": "Traditional A*", "dijkstra": "Dijkstra"}
 COLLISIONS = (Outcome.HIT_KNOWN, Outcome.HIT_UNKNOWN, Outcome.HIT_MOVER)
 
 
@@ -75,10 +77,10 @@ def plan_figure(grid: Grid, plan: Plan | PlannedPath, planner: str = "A*", y_dow
     draw_ends(planned.start, planned.goal, ax)
     _draw_route(grid, planned, "path", ax)
     if len(planned.key_points):
-        _draw_polyline(planned.key_points, ax, linestyle="--")
+        draw_polyline(planned.key_points, ax, linestyle="--")
     names = {"path": "path: ", "key points": "key points: "} if len(planned.path) else {"path": ""}
     lines = [prefix + route_sentence(planned, route) for route, prefix in names.items()]  # pyright: ignore
-    ax.set_title("\n".join([planner, *lines]), fontsize=FONT)
+    ax.set_title("\n".join([PLANNERS.get(planner, planner), *lines]), fontsize=FONT)
     legend_below(ax)
     return figure_of(ax)
 
@@ -119,14 +121,15 @@ def drive_figure(scenario: Scenario, plan: Plan, episode: Episode, trace: Trace,
     draw_ends(scenario.start[:2], scenario.goal, ax)
     _draw_sensed_squares(scenario, np.asarray(trace.known)[steps - 1] if steps else None, ax)
     pale = {"alpha": 0.35, "linestyle": ":", "zorder": 3.2}
-    draw_movers(ways[0], radius, ax, "mover at the start", **pale)
-    draw_movers(ways[-1], radius, ax, "mover at the end")
+    draw_movers(ways[0], radius, ax, "mover, start", **pale)
+    draw_movers(ways[-1], radius, ax, "mover, end")
     draw_mover_ways(ways, ax, heads=False)
-    _draw_plan_of(plan, ax)
+    if int(plan.key_point_count):
+        draw_polyline(np.asarray(plan.key_points)[: int(plan.key_point_count)], ax, "--", "planned path")
     path = driven_path(scenario, trace)
     ax.plot(*path.T, color=VERMILLION, linewidth=2.0, zorder=6, label="driven path", solid_joinstyle="round")
     _draw_last(path[-1], Outcome(int(episode.outcome)), ax)
-    ax.set_title(f"{_prefixed(title)}{drive_sentence(plan, episode, seconds)}", fontsize=FONT)
+    ax.set_title(f"{prefixed(title)}{drive_sentence(plan, episode, seconds)}", fontsize=FONT)
     if legend:
         legend_below(ax)
     return figure_of(ax)
@@ -147,7 +150,7 @@ def success_figure(rates: Mapping[str, tuple[int, int]], paper: float | None = P
     ax.errorbar(place, 100 * share, 100 * np.array([share - low, high - share]), fmt="none", ecolor=BLACK,
                 capsize=4, zorder=3)
     for x, (successes, count) in zip(place, rates.values(), strict=True):
-        ax.text(x, 3, f"{successes / max(count, 1):.1%}\n{successes} of {count}", ha="center", va="bottom",
+        ax.text(float(x), 3, f"{successes / max(count, 1):.1%}\n{successes} of {count}", ha="center", va="bottom",
                 fontsize=FONT - 1, zorder=4)
     if paper is not None:
         ax.axhline(100 * paper, color=VERMILLION, linestyle="--", linewidth=1.5, zorder=1,
@@ -219,8 +222,8 @@ def route_sentence(planned: PlannedPath, route: Route) -> str:
         return f"no path: {planned.status.name}"
     prefix = "" if route == "path" else "key_point_"
     length = planned.length if route == "path" else planned.key_point_length
-    counts = [_counted(planned.measures[f"{prefix}{kind}_points"], f"{kind} point") for kind in ("breaking", "danger")]
-    return ", ".join([f"{length:.2f} m", *counts])
+    breaking, danger = (planned.measures[f"{prefix}{kind}_points"] for kind in ("breaking", "danger"))
+    return f"{length:.2f} m, {breaking} breaking and {danger} danger points"
 
 
 def drive_sentence(plan: Plan, episode: Episode, seconds: float) -> str:
@@ -233,9 +236,17 @@ def drive_sentence(plan: Plan, episode: Episode, seconds: float) -> str:
             f"{float(plan.key_point_length):.2f} m planned, least clearance {float(measures.least_clearance):.2f} m")
 
 
-def figure_of(ax: "Axes") -> "Figure":
-    """The figure that holds the axes."""
-    return ax.get_figure(root=True)  # pyright: ignore[reportReturnType]
+def draw_polyline(key_points: np.ndarray, ax: "Axes", linestyle: str, label: str = "key-point path") -> None:
+    """The key-point polyline [Q, 2], a diamond at each key point between its ends."""
+    ax.plot(*key_points.T, color=BLACK, linewidth=1.6, linestyle=linestyle, zorder=5, label=label)
+    between = key_points[1:-1]
+    ax.plot(*between.T, linestyle="none", marker="D", markersize=4.5, color=BLACK, zorder=6.5,
+            label="key point" if len(between) else "_")
+
+
+def prefixed(title: str) -> str:
+    """The title, if there is one, before what follows it."""
+    return f"{title}: " if title else ""
 
 
 def _draw_panel(grid: Grid, plan: Plan | PlannedPath, route: Route, name: str, ax: "Axes", y_down: bool) -> None:
@@ -246,7 +257,7 @@ def _draw_panel(grid: Grid, plan: Plan | PlannedPath, route: Route, name: str, a
         _draw_route(grid, planned, route, ax)
     else:
         ax.plot(*planned.path.T, color=BLUE, linewidth=1.0, linestyle=":", zorder=4, label="grid path before reduction")
-        _draw_polyline(planned.key_points, ax, linestyle="-")
+        draw_polyline(planned.key_points, ax, linestyle="-")
         _draw_rings(grid, planned, route, ax)
     ax.set_title(f"{name}\n{route_sentence(planned, route)}", fontsize=FONT)
 
@@ -256,8 +267,9 @@ def _draw_route(grid: Grid, planned: PlannedPath, route: Route, ax: "Axes") -> N
     path = planned.path
     ax.plot(*path.T, color=BLUE, linewidth=2.2, zorder=4, label="grid path", **_haloed())
     turning = np.asarray(turning_points(*_on_device(_cells_of(grid, path), np.int32(len(path)))))
-    ax.plot(*path[turning][1:-1].T, linestyle="none", marker="o", markersize=4.5, markerfacecolor="white", markeredgecolor=BLUE,
-            zorder=5, label="breaking point")
+    breaking = path[turning][1:-1]
+    ax.plot(*breaking.T, linestyle="none", marker="o", markersize=4.5, markerfacecolor="white", markeredgecolor=BLUE,
+            zorder=5, label="breaking point" if len(breaking) else "_")
     _draw_rings(grid, planned, route, ax)
 
 
@@ -268,7 +280,7 @@ def _draw_rings(grid: Grid, planned: PlannedPath, route: Route, ax: "Axes") -> N
         return
     size = float(np.clip(0.9 * _cell_size(grid, ax), 7.0, 16.0))
     ax.plot(*points.T, linestyle="none", marker="o", markersize=size, markerfacecolor="none", zorder=7,
-            markeredgecolor=VERMILLION, markeredgewidth=1.8, label="danger point", **_haloed())
+            markeredgecolor=VERMILLION, markeredgewidth=1.8, label="danger point")
 
 
 def _cell_size(grid: Grid, ax: "Axes") -> float:
@@ -278,22 +290,6 @@ def _cell_size(grid: Grid, ax: "Axes") -> float:
     return 72.0 * max(width - 0.8, 1.0) / max(int(grid.height), int(grid.width))
 
 
-def _draw_polyline(key_points: np.ndarray, ax: "Axes", linestyle: str) -> None:
-    """The key-point polyline, a diamond at each key point between its ends."""
-    ax.plot(*key_points.T, color=BLACK, linewidth=1.8, linestyle=linestyle, zorder=5, label="key-point path")
-    ax.plot(*key_points[1:-1].T, linestyle="none", marker="D", markersize=5.5, markerfacecolor="white",
-            markeredgecolor=BLACK, zorder=6, label="key point")
-
-
-def _draw_plan_of(plan: Plan, ax: "Axes") -> None:
-    count = int(plan.key_point_count)
-    if count:
-        key_points = np.asarray(plan.key_points)[:count]
-        ax.plot(*key_points.T, color=BLACK, linewidth=1.4, linestyle="--", zorder=5, label="planned path")
-        ax.plot(*key_points[1:-1].T, linestyle="none", marker="D", markersize=5.5, markerfacecolor="white",
-                markeredgecolor=BLACK, zorder=6.5, label="key point")
-
-
 def _draw_sensed_squares(scenario: Scenario, known: np.ndarray | None, ax: "Axes") -> list[Any]:
     """The unknown squares, pale where `known` [S] is False; None: all pale. Returns their patches."""
     valid = np.asarray(scenario.squares.valid)
@@ -301,7 +297,7 @@ def _draw_sensed_squares(scenario: Scenario, known: np.ndarray | None, ax: "Axes
     sensed = np.zeros(len(patches), bool) if known is None else known[: len(valid)][valid]
     for patch, seen in zip(patches, sensed, strict=True):
         patch.set_facecolor(ORANGE if seen else "white")
-    for seen, label in ((True, "unknown square"), (False, "unknown square, not sensed")):
+    for seen, label in ((True, "unknown square"), (False, "square never sensed")):
         kind = [patch for patch, value in zip(patches, sensed, strict=True) if value == seen]
         for index, patch in enumerate(kind):
             patch.set_label("_" if index else label)
@@ -314,8 +310,8 @@ def _draw_last(position: np.ndarray, outcome: Outcome, ax: "Axes") -> None:
         ax.plot(*position[None].T, linestyle="none", marker="X", markersize=13, markerfacecolor=VERMILLION,
                 markeredgecolor=BLACK, zorder=9, label="collision")
     elif outcome != Outcome.REACHED:
-        ax.plot(*position[None].T, linestyle="none", marker="s", markersize=7, markerfacecolor="white",
-                markeredgecolor=VERMILLION, markeredgewidth=2.0, zorder=9, label="robot at the end")
+        ax.plot(*position[None].T, linestyle="none", marker="o", markersize=7, markerfacecolor="white",
+                markeredgecolor=VERMILLION, markeredgewidth=2.0, zorder=9, label="robot, end")
 
 
 def _haloed() -> dict[str, Any]:
@@ -332,11 +328,3 @@ def _cells_of(grid: Grid, points: np.ndarray) -> np.ndarray:
 
 def _on_device(*trees: Any) -> list[Any]:
     return [jax.device_put(tree) for tree in trees]
-
-
-def _counted(count: int, noun: str) -> str:
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
-
-
-def _prefixed(title: str) -> str:
-    return f"{title}: " if title else ""

@@ -68,7 +68,8 @@ def draw_replay(driven: Replay, title: str, figure: Path, animation: Path | None
     """Write the picture (as Fig. 4) and, if asked for, the animation; returns the files written."""
     import matplotlib.pyplot as plt
 
-    from tuning.figures import animate_drive, drive_figure
+    from tuning.animation import animate_drive
+    from tuning.figures import drive_figure
 
     parts = (driven.scenario, driven.plan, driven.episode, driven.trace)
     try:
@@ -77,6 +78,8 @@ def draw_replay(driven: Replay, title: str, figure: Path, animation: Path | None
         plt.close(picture)
         if animation:
             animate_drive(animation, *parts, title=title)
+    except InputError:
+        raise
     except ValueError as error:
         raise InputError(f"{figure if not figure.exists() else animation}: {error}") from None
     return [figure, animation] if animation else [figure]

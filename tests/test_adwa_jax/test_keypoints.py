@@ -3,7 +3,6 @@
 from fractions import Fraction
 from itertools import pairwise
 
-import chex
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -16,6 +15,7 @@ from tests.reference import astar as astar_reference
 from tests.reference import keypoints as reference
 from tests.test_adwa_jax.worlds import (
     SHAPE,
+    counting,
     drawn,
     few_examples,
     free_cells,
@@ -28,7 +28,7 @@ from tests.test_adwa_jax.worlds import (
 CAPACITY = SHAPE[0] * SHAPE[1]
 MARGINS = [Fraction(n, 16) for n in range(8)]  # 0 … 7/16 of a cell, exact in float32
 
-reduce = jax.jit(key_points, static_argnames="rule")
+reduce, traces = counting(key_points, static_argnames="rule")
 is_free = jax.jit(segment_free)
 
 
@@ -117,7 +117,7 @@ def test_border_blocks_like_an_occupied_square_padded_or_not():
     for occupied in (empty, padded(empty)):
         def answer(margin, occupied=occupied):
             ends = jnp.float32([[1.5, 1.5], [3.5, 1.5]])
-            return bool(segment_free(jnp.asarray(occupied), *ends, jnp.float32(margin)))
+            return bool(is_free(jnp.asarray(occupied), *ends, jnp.float32(margin)))
 
         assert answer(1.49)  # the border is 1.5 cells away
         assert not answer(1.51)
@@ -215,12 +215,9 @@ def test_vmap_equals_a_loop_with_unequal_paths():
         assert int(together.count[k]) == int(alone.count)
 
 
-def test_margin_is_traced():
-    @jax.jit
-    @chex.assert_max_traces(n=1)
-    def traced(occupied, path, count, margin):
-        return key_points(occupied, path, count, margin, "anchor")
-
+def test_other_maps_paths_and_margins_do_not_retrace():
+    reduced(*SOLVED[0], 0.0)
+    before = len(traces)
     for occupied, path in SOLVED[:4]:
-        count = jnp.int32(len(path))
-        traced(jnp.asarray(padded(occupied)), buffer(path), count, jnp.float32(len(path) / 100))
+        reduced(occupied, path, len(path) / 100)
+    assert len(traces) == before

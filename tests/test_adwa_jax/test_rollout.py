@@ -71,16 +71,17 @@ def test_every_candidate_equals_double_precision(start, v, yaw_rate):
 
 def test_prediction_is_the_repeated_step():
     start, v, yaw_rate, dt = pose(3.0, -1.0, 0.7), jnp.float32(0.8), jnp.float32(-0.9), jnp.float32(0.1)
+    step = jax.jit(euler_step)
     poses = predicted((3.0, -1.0, 0.7), [0.8], [-0.9], 0.1)[:, 0, 0]
     for expected in poses:
-        start = euler_step(start, v, yaw_rate, dt)
+        start = step(start, v, yaw_rate, dt)
         np.testing.assert_allclose(np.stack(start), expected, atol=2e-6)
 
 
 def test_vmap_over_poses_equals_a_loop():
     starts = Pose(*jnp.float32([[0, 1, 2], [5, 4, 3], [0, 2, -1]]))
     v, yaw_rate = jnp.float32([0.5, 1.0]), jnp.float32([-1.0, 0.0, 1.0])
-    together = jax.vmap(lambda start: rollout(start, v, yaw_rate, jnp.float32(0.1), STEPS))(starts)
+    together = jax.jit(jax.vmap(lambda start: rollout(start, v, yaw_rate, jnp.float32(0.1), STEPS)))(starts)
     for k in range(3):
         alone = predict(Pose(*(leaf[k] for leaf in starts)), v, yaw_rate, jnp.float32(0.1), steps=STEPS)
         for lane, single in zip(together, alone, strict=True):
@@ -92,6 +93,6 @@ def test_gradients_by_hand():
         return rollout(pose(0, 0, 0), v[None], yaw_rate[None], jnp.float32(0.5), 2).x[-1, 0, 0]
 
     # x = v/2 + v/2 · cos(yaw/2): ∂x/∂v = 1/2 + cos(0.4)/2, ∂x/∂yaw = -v/4 · sin(0.4)
-    slopes = jax.grad(end_x, argnums=(0, 1))(jnp.float32(1.0), jnp.float32(0.8))
+    slopes = jax.jit(jax.grad(end_x, argnums=(0, 1)))(jnp.float32(1.0), jnp.float32(0.8))
     assert float(slopes[0]) == pytest.approx(0.5 + 0.5 * math.cos(0.4), rel=1e-5)
     assert float(slopes[1]) == pytest.approx(-0.25 * math.sin(0.4), rel=1e-5)

@@ -18,7 +18,7 @@ from adwa_jax.simulate import Outcome, drive, trace
 from tests.reference import distance as distance_reference
 from tests.reference import metrics as metrics_reference
 from tests.reference.dwa import square_distance
-from tests.test_adwa_jax.worlds import SHAPE, drawn, grid_of, random_map
+from tests.test_adwa_jax.worlds import SHAPE, counting, drawn, grid_of, random_map
 
 OPTIONS = Options(plan=PlanOptions(subdivision=2), dwa=DwaOptions(5, 9, 10))
 CONSTANTS = paper().constants
@@ -60,19 +60,23 @@ def scenario(occupied, start, goal, *, squares=(), movers=(), heading=None, time
     )  # fmt: skip
 
 
-@jax.jit
-def planned(world, constants):
-    return plan(world.grid, world.start[:2], world.goal, constants, OPTIONS.plan)
+def whole_run(world, constants):
+    """Plan and episode."""
+    known = plan(world.grid, world.start[:2], world.goal, constants, OPTIONS.plan)
+    return known, drive(world, known, constants, OPTIONS)
 
 
-@jax.jit
+run, traces = counting(whole_run)
+
+
 def driven(world, constants):
-    return drive(world, planned(world, constants), constants, OPTIONS)
+    return run(world, constants)[1]
 
 
 @jax.jit
 def traced(world, constants):
-    return trace(world, planned(world, constants), constants, OPTIONS, STEPS)
+    known = plan(world.grid, world.start[:2], world.goal, constants, OPTIONS.plan)
+    return trace(world, known, constants, OPTIONS, STEPS)
 
 
 def outcome(world, constants=CONSTANTS):
@@ -159,7 +163,7 @@ def test_wall_is_rounded_by_way_of_the_key_points():
 
 def test_robot_faces_its_first_key_point_unless_a_heading_is_given():
     standing = crawling()
-    first = planned(ROUND_THE_WALL, standing).key_points[1]
+    first = run(ROUND_THE_WALL, standing)[0].key_points[1]
     towards = math.atan2(float(first[1]) - 1.5, float(first[0]) - 1.5)
     first_turn = CONSTANTS.robot.yaw_acceleration * DT * DT
     assert abs(float(traced(ROUND_THE_WALL, standing)[1].robot.heading[0]) - towards) <= first_turn + 1e-5
@@ -179,7 +183,7 @@ def test_measures_equal_plain_loops_over_the_trace(world):
     positions = [tuple(map(float, world.start[:2])), *zip(x, y, strict=True)]
     turns = np.concatenate([[0.0], np.cumsum(yaw_rate * DT)])
     clearance = np.asarray(path.clearance)[:length].tolist()
-    shortest = float(planned(world, CONSTANTS).optimal_length)
+    shortest = float(run(world, CONSTANTS)[0].optimal_length)
     success = Outcome(int(episode.outcome)) is Outcome.REACHED
     expected = {
         "time": length * DT,
@@ -256,20 +260,26 @@ def test_vmap_equals_a_loop_with_unequal_episodes():
               scenario(random_map(4, (9, 9), 0.15), (0.5, 0.5), (8.5, 8.5)),
               scenario(ROOM, (2.5, 6.5), (9.5, 6.5), time_limit=0.5)]
     stacked = jax.tree.map(lambda *leaves: jnp.stack(leaves), *worlds)
-    together = jax.jit(jax.vmap(driven, (0, None)))(stacked, CONSTANTS)
+    plans, episodes = jax.jit(jax.vmap(whole_run, (0, None)))(stacked, CONSTANTS)
     for k, world in enumerate(worlds):
-        chex.assert_trees_all_close(jax.tree.map(lambda leaf, k=k: leaf[k], together), driven(world, CONSTANTS),
-                                    rtol=1e-3, atol=1e-3)
-    assert len(set(np.asarray(together.measures.time).tolist())) >= 5
+        plan_alone, alone = run(world, CONSTANTS)
+        chex.assert_trees_all_close(jax.tree.map(lambda leaf, k=k: leaf[k], plans), plan_alone, rtol=1e-6)
+        episode = jax.tree.map(lambda leaf, k=k: leaf[k], episodes)
+        chex.assert_trees_all_close(episode, alone, rtol=1e-3, atol=1e-3)
+    assert len(set(np.asarray(episodes.measures.time).tolist())) >= 5
 
 
-def test_padding_changes_no_episode():
+def test_padding_changes_neither_plan_nor_episode():
     occupied = random_map(4, (9, 9), 0.15)
     inside = {"squares": [(4.0, 5.0, 0.2)], "movers": [(6.0, 2.0, 0.2, 0.3, 0.2)]}
-    full = driven(scenario(occupied, (0.5, 0.5), (8.5, 8.5), **inside), CONSTANTS)
-    alone = driven(scenario(occupied, (0.5, 0.5), (8.5, 8.5), **inside, shape=None), CONSTANTS)
-    chex.assert_trees_all_close(full, alone, rtol=1e-3, atol=1e-3)
-    assert float(full.measures.time) > 1.0
+    plan_padded, padded = run(scenario(occupied, (0.5, 0.5), (8.5, 8.5), **inside), CONSTANTS)
+    plan_alone, alone = run(scenario(occupied, (0.5, 0.5), (8.5, 8.5), **inside, shape=None), CONSTANTS)
+    chex.assert_trees_all_close(padded, alone, rtol=1e-3, atol=1e-3)
+    for name in ("length", "key_point_length", "key_point_count", "optimal_length", "measures"):
+        chex.assert_trees_all_equal(getattr(plan_alone, name), getattr(plan_padded, name))
+    np.testing.assert_array_equal(plan_alone.search.expanded_at, plan_padded.search.expanded_at[:9, :9])
+    np.testing.assert_array_equal(plan_alone.key_points, plan_padded.key_points[:81])
+    assert float(padded.measures.time) > 1.0
 
 
 def test_reference_length_sets_the_barn_score():
@@ -281,11 +291,9 @@ def test_reference_length_sets_the_barn_score():
 
 
 def test_changing_constants_and_scenarios_does_not_retrace():
-    @jax.jit
-    @chex.assert_max_traces(n=1)
-    def counted(world, constants):
-        return drive(world, planned(world, constants), constants, OPTIONS).outcome
-
-    for k, world in enumerate((ACROSS, scenario(drawn(".#."), (0.5, 0.5), (2.5, 0.5)))):
+    run(ACROSS, CONSTANTS)
+    before = len(traces)
+    for k, world in enumerate((ACROSS, BUSY, scenario(drawn(".#."), (0.5, 0.5), (2.5, 0.5)))):
         weights = replace(CONSTANTS.weights, velocity=0.1 * (k + 1))
-        counted(world, replace(changed(sensor_range=1.0 + k), weights=weights))
+        run(world, replace(changed(sensor_range=1.0 + k), weights=weights))
+    assert len(traces) == before

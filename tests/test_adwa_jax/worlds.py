@@ -1,5 +1,8 @@
 """Small maps for the kernel tests: all padded to one shape, so that each kernel compiles once."""
 
+from functools import wraps
+
+import jax
 import jax.numpy as jnp
 import numpy as np
 from hypothesis import settings
@@ -53,6 +56,18 @@ def free_cells(occupied, seed, count):
     free = np.argwhere(~occupied)
     picked = np.random.default_rng(seed).integers(len(free), size=count)
     return [tuple(int(i) for i in free[k]) for k in picked]
+
+
+def counting(function, **jit_options):
+    """The jitted function and a list that grows by one each time it is traced."""
+    traces = []
+
+    @wraps(function)
+    def counted(*args, **kwargs):
+        traces.append(1)
+        return function(*args, **kwargs)
+
+    return jax.jit(counted, **jit_options), traces
 
 
 def cell(row_column):

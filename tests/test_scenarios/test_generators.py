@@ -253,7 +253,7 @@ def test_paper_runs_from_the_upper_left_to_the_lower_right_corner(cells, movers)
     assert not scenario.heading_given
     assert scenario.grid.occupied.shape == (cells, cells)
     assert len(scenario.movers.valid) == movers
-    assert float(scenario.time_limit) == 60.0
+    assert float(scenario.time_limit) == 100.0
 
 
 def test_paper_density_is_the_share_of_occupied_cells():

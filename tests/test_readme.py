@@ -1,0 +1,45 @@
+"""The README's promises that a machine can check."""
+
+import re
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+README = (ROOT / "README.md").read_text()
+
+
+def test_the_python_example_runs_and_prints_outcomes(capsys):
+    (example,) = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+    assert len(example.strip().splitlines()) <= 10
+    exec(compile(example, "README.md", "exec"), {})
+    printed = capsys.readouterr().out
+    assert printed.count("'REACHED': ") == 2
+
+
+def test_the_weights_example_is_the_paper_presets_constants(tmp_path):
+    from adwa_jax.presets import paper
+    from tuning.weights_file import load_weights
+
+    (example,) = re.findall(r"```toml\n(.*?)```", README, re.DOTALL)
+    (tmp_path / "weights.toml").write_text(example)
+    assert load_weights(tmp_path / "weights.toml", paper().constants) == paper().constants
+
+
+def test_every_name_and_file_of_the_notation_table_exists():
+    rows = re.findall(r"^\|.*\| `(adwa_jax/\w+\.py)` \|$", README, re.MULTILINE)
+    assert len(rows) > 10
+    table = README[README.index("## From the paper to the code") : README.index("Kernels are unbatched")]
+    for line in table.splitlines():
+        file = re.search(r"`(adwa_jax/\w+\.py)`", line)
+        if not file:
+            continue
+        source = (ROOT / file[1]).read_text()
+        for name in re.findall(r"`(\w+)`", line.rsplit("|", 2)[0]):
+            assert re.search(rf"\b{name}\b", source), f"{name} is not in {file[1]}"
+
+
+def test_pictures_and_make_targets_exist():
+    makefile = (ROOT / "Makefile").read_text()
+    for target in re.findall(r"(?:^|`)make (\w+)", README, re.MULTILINE):
+        assert re.search(rf"^{target}:", makefile, re.MULTILINE), target
+    for picture in re.findall(r"!\[.*?\]\((.*?)\)", README):
+        assert (ROOT / picture).is_file(), picture
