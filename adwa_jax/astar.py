@@ -151,8 +151,7 @@ def _weighted_heuristic(shape: tuple[int, int], goal_cell: jax.Array, weight: ja
     if heuristic == "octile":
         h = jnp.abs(dr - dc) * costs.straight + jnp.minimum(dr, dc) * costs.diagonal
     elif heuristic == "euclidean":
-        squared = (dr * dr + dc * dc).astype(jnp.float32)
-        h = jnp.floor(jnp.sqrt(squared) * costs.straight).astype(jnp.int32)
+        h = _scaled_root(dr * dr + dc * dc, costs.straight)
     elif heuristic == "manhattan":
         h = (dr + dc) * costs.straight
     else:
@@ -160,6 +159,16 @@ def _weighted_heuristic(shape: tuple[int, int], goal_cell: jax.Array, weight: ja
     steps = jnp.round(weight * WEIGHT_STEPS).astype(jnp.int32)
     high, low = h // WEIGHT_STEPS, h % WEIGHT_STEPS  # the product itself would overflow
     return high * steps + (low * steps + WEIGHT_STEPS // 2) // WEIGHT_STEPS, h // costs.straight
+
+
+def _scaled_root(square: jax.Array, scale: int) -> jax.Array:
+    """scale · √square to the nearest whole number, int32; the whole part is exact, float32 errs on the rest only."""
+    whole = jnp.floor(jnp.sqrt(square.astype(jnp.float32))).astype(jnp.int32)
+    whole = jnp.where(whole * whole > square, whole - 1, whole)
+    whole = jnp.where((whole + 1) * (whole + 1) <= square, whole + 1, whole)
+    rest = (square - whole * whole).astype(jnp.float32)
+    fraction = rest / jnp.maximum(whole.astype(jnp.float32) + jnp.sqrt(square.astype(jnp.float32)), 1.0)
+    return whole * scale + jnp.round(fraction * scale).astype(jnp.int32)
 
 
 def _legal_moves(blocked: jax.Array, rule: CornerRule) -> jax.Array:
@@ -261,13 +270,13 @@ def _choose(carry: _Carry, floor: jax.Array, goal: jax.Array, costs: _Costs, bud
     column = jnp.argmax((line == f) & (line_floor == floors[row])).astype(jnp.int32) + 1
     cell = jnp.stack([row, column])
     cell_g = carry.reached[row, column, 0]
-    found = jnp.all(cell == goal)
+    found = (f != FAR) & jnp.all(cell == goal)
     if stop_rule == "generated":
         found |= carry.reached[goal[0], goal[1], 0] != FAR
     exhausted = (carry.expansions >= budget) | (cell_g >= costs.limit)
     status = jnp.where(exhausted, np.int32(Status.BUDGET_EXHAUSTED), RUNNING)
+    status = jnp.where(f == FAR, np.int32(Status.UNREACHABLE), status)
     status = jnp.where(found, np.int32(Status.FOUND), status)
-    status = jnp.where(f == FAR, jnp.where(found, status, np.int32(Status.UNREACHABLE)), status)
     return carry._replace(cell=cell, cell_g=cell_g, status=status)
 
 

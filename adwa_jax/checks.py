@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 
-def require(holds: bool, field: str, value: object, rule: str, remedy: str) -> None:
+def require(holds: Any, field: str, value: object, rule: str, remedy: str) -> None:
     """Raise ValueError "field = value: rule; remedy" unless `holds`."""
     if not holds:
         raise ValueError(f"{field} = {value:g}: {rule}; {remedy}" if isinstance(value, float)

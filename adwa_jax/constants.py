@@ -8,6 +8,7 @@ import jax
 from adwa_jax.astar import SearchOptions
 from adwa_jax.checks import require, require_choice, require_numbers, require_whole
 from adwa_jax.dwa import DwaOptions
+from adwa_jax.grid import Scalar
 from adwa_jax.heuristic_weight import Scope, WeightRule
 from adwa_jax.keypoints import KeyPointRule
 from adwa_jax.score import ScoreWeights
@@ -24,14 +25,14 @@ from adwa_jax.window import RobotLimits
 class Behaviour:
     """Distances and times of the closed loop (§4). Traced."""
 
-    dt: jax.Array | float  # control step [s]
-    clearance_cap: jax.Array | float  # the clearance term grows no further [m]
-    clearance_margin: jax.Array | float  # key-point segments keep more than this from occupied squares [m]
-    keypoint_tolerance: jax.Array | float  # a key point counts as reached within this distance [m]
-    sensor_range: jax.Array | float  # to an obstacle's outline [m]
-    danger_clearance: jax.Array | float  # closer than this is a danger point of the driven path [m]
-    stuck_radius: jax.Array | float  # STUCK: not out of this circle [m] ...
-    stuck_time: jax.Array | float  # ... for so long [s]
+    dt: Scalar  # control step [s]
+    clearance_cap: Scalar  # the clearance term grows no further [m]
+    clearance_margin: Scalar  # key-point segments keep more than this from occupied squares [m]
+    keypoint_tolerance: Scalar  # a key point counts as reached within this distance [m]
+    sensor_range: Scalar  # to an obstacle's outline [m]
+    danger_clearance: Scalar  # closer than this is a danger point of the driven path [m]
+    stuck_radius: Scalar  # STUCK: not out of this circle [m] ...
+    stuck_time: Scalar  # ... for so long [s]
 
     def __post_init__(self) -> None:
         """Refuse negative distances and a step that is not positive; traced values pass unseen."""

@@ -9,7 +9,7 @@ from adwa_jax.grid import Grid
 
 
 class Density(NamedTuple):
-    """Counts whose ratios are the densities: P = obstacles / cells (eq. 2) and Q = map_obstacles / map_cells (eq. 3)."""
+    """Counts whose ratios are the densities: P = obstacles / cells (eq. 2), Q = map_obstacles / map_cells (eq. 3)."""
 
     obstacles: jax.Array  # [H, W] float32, N: occupied cells in the rectangle spanned by the cell and the goal
     cells: jax.Array  # [H, W] float32, M: cells of that rectangle, both corners included

@@ -11,7 +11,7 @@ import jax.numpy as jnp
 from jax import lax
 
 from adwa_jax.checks import require_choice, require_whole
-from adwa_jax.grid import DistanceField, clearance_at
+from adwa_jax.grid import DistanceField, Scalar, clearance_at
 from adwa_jax.obstacles import NOWHERE, Sensed, clearance_to_movers, clearance_to_squares
 from adwa_jax.rollout import Arcs, Pose, arcs
 from adwa_jax.score import (
@@ -21,6 +21,7 @@ from adwa_jax.score import (
     clearance_term,
     heading_term,
     normalise,
+    turn_towards,
     velocity_term,
     weighted_sum,
 )
@@ -74,7 +75,7 @@ class Decision(NamedTuple):
 
 
 def decide(state: RobotState, local_target: jax.Array, goal: jax.Array, field: DistanceField, sensed: Sensed,
-           weights: ScoreWeights, robot: RobotLimits, clearance_cap: jax.Array, dt: jax.Array,
+           weights: ScoreWeights, robot: RobotLimits, clearance_cap: Scalar, dt: Scalar,
            options: DwaOptions) -> Decision:
     """The admissible candidate of largest score (eq. 9); ties go to the lower index.
 
@@ -103,7 +104,7 @@ def decide(state: RobotState, local_target: jax.Array, goal: jax.Array, field: D
 
 
 def candidate_clearance(state: RobotState, v: jax.Array, arc: Arcs, field: DistanceField, sensed: Sensed,
-                        dt: jax.Array) -> jax.Array:
+                        dt: Scalar) -> jax.Array:
     """[V, N]: least distance [m] of each candidate's K points to known squares, sensed squares and predicted movers.
 
     Measured from the robot's centre. Points are taken one step at a time: a scan that carries the minima moves fewer
@@ -136,10 +137,9 @@ def is_admissible(clearance: jax.Array, v: jax.Array, yaw_rate: jax.Array, robot
 
 
 def brake_and_turn(state: RobotState, v: jax.Array, yaw_rate: jax.Array, local_target: jax.Array,
-                   dt: jax.Array) -> tuple[jax.Array, jax.Array]:
+                   dt: Scalar) -> tuple[jax.Array, jax.Array]:
     """The speed nearest 0 and the yaw rate nearest to facing the target after one step, both within the window."""
-    bearing = jnp.arctan2(local_target[1] - state.y, local_target[0] - state.x)
-    turn = wrap(bearing - state.heading) / dt
+    turn = turn_towards(state.x, state.y, state.heading, local_target) / dt
     return jnp.clip(0.0, v[0], v[-1]), jnp.clip(turn, yaw_rate[0], yaw_rate[-1])
 
 
@@ -149,7 +149,7 @@ def wrap(angle: jax.Array) -> jax.Array:
 
 
 def _terms(state: RobotState, v: jax.Array, arc: Arcs, clearance: jax.Array, local_target: jax.Array,
-           goal: jax.Array, clearance_cap: jax.Array) -> Terms:
+           goal: jax.Array, clearance_cap: Scalar) -> Terms:
     end = Pose(
         x=state.x + v[:, None] * arc.reach_x[-1][None, :],
         y=state.y + v[:, None] * arc.reach_y[-1][None, :],

@@ -12,6 +12,8 @@ import jax
 import jax.numpy as jnp
 from jax import lax
 
+Scalar = jax.Array | float  # [] float32, traced, or a plain number
+
 # Largest value by which bilinear interpolation exceeds the true distance, in units of the lattice spacing:
 # at the convex corner of a square the interpolant is (2 - √2)·t·(1 - t) too large on the diagonal, t in [0, 1].
 # Flat sides are exact, because the sides of cells are lattice lines, and the distance to a union of squares is the
@@ -86,7 +88,7 @@ def bilinear(field: DistanceField, x: jax.Array, y: jax.Array) -> jax.Array:
     return below + fraction_v * (above - below)
 
 
-def inflate(grid: Grid, radius: jax.Array) -> jax.Array:
+def inflate(grid: Grid, radius: Scalar) -> jax.Array:
     """[H, W] bool: cells in which a disc of `radius` [m] centred on the cell's centre meets an occupied square.
 
     Exact; touching counts as meeting, and radius 0 gives the occupied cells themselves. The map's border, beyond which
@@ -111,8 +113,8 @@ def squared_distance(touched: jax.Array, reach: jax.Array | None = None) -> jax.
 
     With `reach`, [] int32, only distances up to so many steps are exact; farther points get some value above reach².
 
-    Two 1-D passes (Saito and Toriwaki 1994): along rows by counting from either side, then along columns by the least of
-    k² + (row distance at ± k)², k growing until no column can improve. Needs a True on the border of every row.
+    Two 1-D passes (Saito and Toriwaki 1994): along rows by counting from either side, then along columns by the least
+    of k² + (row distance at ± k)², k growing until no column can improve. Needs a True on the border of every row.
 
     touched: [h, w] bool. Returns [h, w] int32.
     """

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 
 from adwa_jax.checks import require, require_numbers
 from adwa_jax.density import Density, obstacle_density
-from adwa_jax.grid import Grid
+from adwa_jax.grid import Grid, Scalar
 
 Scope = Literal["start", "node", "one"]
 MAX_WEIGHT = 16.0  # the search's integer costs leave room for weights up to this
@@ -28,12 +28,12 @@ class WeightRule:
     sparse: dense_base + dense_gain / dense_ratio < 1 and sparse_base ≥ 1, gains ≥ 0.
     """
 
-    dense_base: jax.Array | float  # α
-    dense_gain: jax.Array | float  # β
-    sparse_base: jax.Array | float  # γ
-    sparse_gain: jax.Array | float  # δ
-    dense_ratio: jax.Array | float = 1.5  # dense where P ≥ dense_ratio·Q
-    sparse_ratio: jax.Array | float = 0.5  # sparse where P < sparse_ratio·Q
+    dense_base: Scalar  # α
+    dense_gain: Scalar  # β
+    sparse_base: Scalar  # γ
+    sparse_gain: Scalar  # δ
+    dense_ratio: Scalar = 1.5  # dense where P ≥ dense_ratio·Q
+    sparse_ratio: Scalar = 0.5  # sparse where P < sparse_ratio·Q
 
     def __post_init__(self) -> None:
         """Refuse constants that break the rule's promise; traced values pass unseen."""

@@ -63,7 +63,7 @@ def key_points(occupied: jax.Array, path: jax.Array, path_cells: jax.Array, marg
 
 
 def segment_free(occupied: jax.Array, a: jax.Array, b: jax.Array, margin: jax.Array) -> jax.Array:
-    """[] bool: whether every occupied square is farther than `margin` ≥ 0 from the segment ab; touching is not free.
+    """[] bool: whether all that is occupied is farther than `margin` ≥ 0 from the segment ab; touching is not free.
 
     Only the cells in a band about the segment are looked at: along its longer axis one line of cells after another,
     across it as many as the margin can reach. Separating axes decide whether square and segment meet; otherwise the
@@ -88,7 +88,7 @@ def segment_free(occupied: jax.Array, a: jax.Array, b: jax.Array, margin: jax.Ar
         apart = _separated(low_x, low_y, a, b) & (_distance_apart(low_x, low_y, a, b) > margin)
         return free & jnp.all(apart | ~taken)
 
-    return lax.fori_loop(0, 2 * half_band + 1, body_fun, jnp.bool_(True))
+    return lax.fori_loop(0, 2 * half_band + 1, body_fun, _to_border(occupied.shape, a, b) > margin)
 
 
 def centre(cell: jax.Array) -> jax.Array:
@@ -101,6 +101,12 @@ def polyline_length(points: jax.Array, count: jax.Array) -> jax.Array:
     steps = points[1:] - points[:-1]
     used = jnp.arange(1, points.shape[0]) < count
     return jnp.sum(jnp.where(used, jnp.sqrt(jnp.sum(steps * steps, axis=1)), 0.0))
+
+
+def _to_border(shape: tuple[int, ...], a: jax.Array, b: jax.Array) -> jax.Array:
+    """[] least distance from the segment to the border, beyond which all is occupied: that of one of its ends."""
+    size = jnp.array(shape[::-1], jnp.float32)
+    return jnp.min(jnp.minimum(jnp.minimum(a, b), size - jnp.maximum(a, b)))
 
 
 def _separated(low_x: jax.Array, low_y: jax.Array, a: jax.Array, b: jax.Array) -> jax.Array:

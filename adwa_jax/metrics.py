@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import lax
 
-from adwa_jax.grid import Grid
+from adwa_jax.grid import Grid, Scalar
 from adwa_jax.keypoints import KeyPoints, turning_points
 
 TURN = np.float32(np.deg2rad(15.0))  # a turn counts as a breaking point once it has accumulated more than this
@@ -131,7 +131,7 @@ def start_measures() -> Running:
     )  # fmt: skip
 
 
-def measure_step(running: Running, step: Step, danger_clearance: jax.Array) -> Running:
+def measure_step(running: Running, step: Step, danger_clearance: Scalar) -> Running:
     """Take one more step into account. Unbatched."""
     moved = _norm(step.dx, step.dy)
     moves = moved > 1e-6
@@ -166,7 +166,7 @@ def _turn(accumulated: jax.Array, turn: jax.Array) -> tuple[jax.Array, jax.Array
     return after, (jnp.abs(before) <= TURN) & (jnp.abs(after) > TURN)
 
 
-def finish_measures(running: Running, success: jax.Array, dt: jax.Array, shortest: jax.Array,
+def finish_measures(running: Running, success: jax.Array, dt: Scalar, shortest: jax.Array,
                     reference: jax.Array) -> Measures:
     """Means and scores. success: [] bool; shortest ℓ and BARN reference length: [] [m]. No division by zero."""
     steps = running.steps.astype(jnp.float32)

@@ -7,6 +7,7 @@ import jax
 import jax.numpy as jnp
 from jax import lax
 
+from adwa_jax.grid import Scalar
 from adwa_jax.scenario import Movers, UnknownSquares
 
 NOWHERE = 1e6  # distance [m] reported to what is absent; finite, so that no arithmetic on it makes a NaN
@@ -76,7 +77,7 @@ def _along_track(track: jax.Array, length: jax.Array, period: jax.Array, time: j
 
 
 def sense(squares: UnknownSquares, known: jax.Array, movers: Movers, states: MoverStates, position: jax.Array,
-          sensor_range: jax.Array) -> Sensed:
+          sensor_range: Scalar) -> Sensed:
     """Squares within range become known and stay so; movers are seen while in range (§4 D a, b).
 
     Range is measured to the obstacle's outline. Unbatched. known: [S] bool; position: [2] [m]; sensor_range: [] [m].

@@ -24,7 +24,7 @@ class Plan(NamedTuple):
 
     search: SearchResult
     length: jax.Array  # [] float32, of the grid path; 0 without a path
-    key_points: jax.Array  # [P, 2] float32 (x, y), start and goal cells' centres included; beyond the count the last repeats
+    key_points: jax.Array  # [P, 2] float32 (x, y), start's and goal's cells included; beyond the count the last repeats
     key_point_count: jax.Array  # [] int32
     key_point_length: jax.Array  # [] float32
     measures: PlannedMeasures

@@ -5,6 +5,8 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 
+from adwa_jax.grid import Scalar
+
 
 class Pose(NamedTuple):
     """Position and heading; arrays of one shape."""
@@ -22,7 +24,7 @@ class Arcs(NamedTuple):
     heading: jax.Array  # [K, N] float32 [rad]
 
 
-def euler_step(pose: Pose, v: jax.Array, yaw_rate: jax.Array, dt: jax.Array) -> Pose:
+def euler_step(pose: Pose, v: jax.Array, yaw_rate: jax.Array, dt: Scalar) -> Pose:
     """x + v·cosθ·dt, y + v·sinθ·dt, θ + yaw_rate·dt (eq. 7). Any equal shapes."""
     return Pose(
         x=pose.x + v * jnp.cos(pose.heading) * dt,
@@ -31,7 +33,7 @@ def euler_step(pose: Pose, v: jax.Array, yaw_rate: jax.Array, dt: jax.Array) -> 
     )
 
 
-def arcs(heading: jax.Array, yaw_rate: jax.Array, dt: jax.Array, steps: int) -> Arcs:
+def arcs(heading: jax.Array, yaw_rate: jax.Array, dt: Scalar, steps: int) -> Arcs:
     """The K = `steps` points after each Euler step (eq. 7) for N yaw rates, per unit of speed.
 
     Σ v·cosθ·dt = v · Σ cosθ·dt: all speeds share the sums. Unbatched. heading [rad], dt [s]: []; yaw_rate: [N] [rad/s].
@@ -45,7 +47,7 @@ def arcs(heading: jax.Array, yaw_rate: jax.Array, dt: jax.Array, steps: int) -> 
     )
 
 
-def rollout(pose: Pose, v: jax.Array, yaw_rate: jax.Array, dt: jax.Array, steps: int) -> Pose:
+def rollout(pose: Pose, v: jax.Array, yaw_rate: jax.Array, dt: Scalar, steps: int) -> Pose:
     """Predicted poses [K, V, N] of every pair of V speeds and N yaw rates. Unbatched; pose fields []."""
     arc = arcs(pose.heading, yaw_rate, dt, steps)
     shape = (steps, v.shape[0], yaw_rate.shape[0])

@@ -11,6 +11,7 @@ import jax
 import jax.numpy as jnp
 
 from adwa_jax.checks import require_numbers
+from adwa_jax.grid import Scalar
 
 Normalisation = Literal["sum", "minmax", "none"]
 
@@ -24,10 +25,10 @@ Normalisation = Literal["sum", "minmax", "none"]
 class ScoreWeights:
     """α, β, γ, δ of eq. 9; with `global_heading` 0 and the goal as local target, eq. 8. Traced, ≥ 0."""
 
-    local_heading: jax.Array | float  # α
-    clearance: jax.Array | float  # β
-    velocity: jax.Array | float  # γ
-    global_heading: jax.Array | float  # δ
+    local_heading: Scalar  # α
+    clearance: Scalar  # β
+    velocity: Scalar  # γ
+    global_heading: Scalar  # δ
 
     def __post_init__(self) -> None:
         """Refuse negative and non-finite weights; traced values pass unseen."""
@@ -46,16 +47,24 @@ class Terms(NamedTuple):
 def heading_term(x: jax.Array, y: jax.Array, heading: jax.Array, target: jax.Array) -> jax.Array:
     """π − |angle between the end heading and the bearing end → target|, in [0, π] (LHeading and GHeading of eq. 9).
 
-    On the target itself the bearing has no meaning and the term is π. Any equal shapes; target: [2] [m].
+    On the target itself the term is π. Any equal shapes; target: [2] [m].
+    """
+    return jnp.pi - jnp.abs(turn_towards(x, y, heading, target))
+
+
+def turn_towards(x: jax.Array, y: jax.Array, heading: jax.Array, target: jax.Array) -> jax.Array:
+    """Angle in [−π, π] from the heading to the bearing of the target [rad], anticlockwise positive.
+
+    On the target (within 1 µm) the bearing has no meaning and the angle is 0. Any equal shapes; target: [2] [m].
     """
     dx, dy = target[0] - x, target[1] - y
     ahead = jnp.cos(heading) * dx + jnp.sin(heading) * dy
-    aside = jnp.abs(jnp.cos(heading) * dy - jnp.sin(heading) * dx)
-    arrived = (dx == 0) & (dy == 0)
-    return jnp.pi - jnp.arctan2(aside, jnp.where(arrived, 1.0, ahead))
+    aside = jnp.cos(heading) * dy - jnp.sin(heading) * dx
+    arrived = dx * dx + dy * dy < 1e-12
+    return jnp.arctan2(jnp.where(arrived, 0.0, aside), jnp.where(arrived, 1.0, ahead))
 
 
-def clearance_term(clearance: jax.Array, cap: jax.Array) -> jax.Array:
+def clearance_term(clearance: jax.Array, cap: Scalar) -> jax.Array:
     """Dist of eq. 9: the candidate's clearance [m] up to `cap`, beyond which more room is no better."""
     return jnp.minimum(clearance, cap)
 

@@ -11,12 +11,13 @@ from jax import lax
 from adwa_jax.astar import Status
 from adwa_jax.constants import Constants, Options
 from adwa_jax.dwa import Decision, RobotState, decide, wrap
-from adwa_jax.grid import clearance_at, distance_to_squares
+from adwa_jax.grid import Scalar, clearance_at, distance_to_squares
 from adwa_jax.metrics import Measures, Running, Step, finish_measures, measure_step, start_measures
 from adwa_jax.obstacles import MoverStates, Sensed, clearance_to_movers, clearance_to_squares, movers_at, sense
 from adwa_jax.plan import Plan
 from adwa_jax.rollout import Pose, euler_step
 from adwa_jax.scenario import Scenario
+from adwa_jax.score import turn_towards
 
 
 class Outcome(IntEnum):
@@ -88,7 +89,7 @@ def trace(scenario: Scenario, plan: Plan, constants: Constants, options: Options
 
     def body_fun(state: EpisodeState, _: None) -> tuple[EpisodeState, tuple]:
         running = state.outcome == RUNNING
-        moved, _ = control_step(state, scenario, plan, constants, options)
+        moved = control_step(state, scenario, plan, constants, options)[0]
         state = jax.tree.map(lambda new, old: jnp.where(running, new, old), moved, state)
         movers = movers_at(scenario.movers, state.step.astype(jnp.float32) * constants.behaviour.dt)
         row = (state.robot, movers, state.known, local_target(state.target, scenario, plan),
@@ -106,7 +107,7 @@ def start_episode(scenario: Scenario, plan: Plan) -> EpisodeState:
     """Standing at the start, facing the first key point unless a heading is given; over at once without a path."""
     start = scenario.start
     first = local_target(jnp.minimum(1, plan.key_point_count - 1), scenario, plan)
-    towards = jnp.arctan2(first[1] - start[1], first[0] - start[0])
+    towards = turn_towards(start[0], start[1], jnp.float32(0.0), first)
     heading = jnp.where(scenario.heading_given, start[2], towards)
     still = jnp.float32(0.0)
     return EpisodeState(
@@ -125,7 +126,7 @@ def start_episode(scenario: Scenario, plan: Plan) -> EpisodeState:
 
 def control_step(state: EpisodeState, scenario: Scenario, plan: Plan, constants: Constants,
                  options: Options) -> tuple[EpisodeState, Decision]:
-    """Sense, pick the target, decide, move robot and movers, judge (§4 B–F). The decision comes with its diagnostics."""
+    """Sense, pick the target, decide, move robot and movers, judge (§4 B–F); also the decision with its diagnostics."""
     behaviour = constants.behaviour
     time = state.step.astype(jnp.float32) * behaviour.dt
     position = jnp.stack([state.robot.x, state.robot.y])
@@ -149,7 +150,7 @@ def control_step(state: EpisodeState, scenario: Scenario, plan: Plan, constants:
     return judge(state, pose, scenario, plan, constants, options), decision
 
 
-def next_target(target: jax.Array, position: jax.Array, plan: Plan, tolerance: jax.Array) -> jax.Array:
+def next_target(target: jax.Array, position: jax.Array, plan: Plan, tolerance: Scalar) -> jax.Array:
     """[] int32: the next key point not yet within `tolerance`; the last stays (§4 B)."""
 
     def cond_fun(index: jax.Array) -> jax.Array:
@@ -166,7 +167,7 @@ def local_target(index: jax.Array, scenario: Scenario, plan: Plan) -> jax.Array:
 
 def judge(state: EpisodeState, before: Pose, scenario: Scenario, plan: Plan, constants: Constants,
           options: Options) -> EpisodeState:
-    """Contact, arrival, standstill and time after a step, in this order; and the measures (spec: Outcomes, Measures)."""
+    """Contact, arrival, standstill and time after a step, in this order; and the measures."""
     behaviour, robot = constants.behaviour, state.robot
     known, unknown, moving = clearances(state, scenario, plan, constants, options)
     step = Step(robot.x - before.x, robot.y - before.y, robot.yaw_rate * behaviour.dt, robot.v, robot.yaw_rate,

@@ -7,6 +7,7 @@ import jax
 import jax.numpy as jnp
 
 from adwa_jax.checks import require, require_numbers
+from adwa_jax.grid import Scalar
 
 
 @partial(
@@ -18,14 +19,14 @@ from adwa_jax.checks import require, require_numbers
 class RobotLimits:
     """A disc robot's size and limits. Traced."""
 
-    radius: jax.Array | float  # [m]
-    v_min: jax.Array | float  # [m/s]; negative: may reverse
-    v_max: jax.Array | float  # [m/s]
-    yaw_rate_max: jax.Array | float  # [rad/s], both ways
-    acceleration: jax.Array | float  # [m/s²], bounds the window
-    yaw_acceleration: jax.Array | float  # [rad/s²]
-    brake: jax.Array | float  # [m/s²], what admissibility counts on
-    yaw_brake: jax.Array | float  # [rad/s²]
+    radius: Scalar  # [m]
+    v_min: Scalar  # [m/s]; negative: may reverse
+    v_max: Scalar  # [m/s]
+    yaw_rate_max: Scalar  # [rad/s], both ways
+    acceleration: Scalar  # [m/s²], bounds the window
+    yaw_acceleration: Scalar  # [rad/s²]
+    brake: Scalar  # [m/s²], what admissibility counts on
+    yaw_brake: Scalar  # [rad/s²]
 
     def __post_init__(self) -> None:
         """Refuse limits no robot can have; traced values pass unseen."""
@@ -39,7 +40,7 @@ class RobotLimits:
                 "lower it")
 
 
-def velocity_window(v: jax.Array, yaw_rate: jax.Array, robot: RobotLimits, dt: jax.Array, v_samples: int,
+def velocity_window(v: jax.Array, yaw_rate: jax.Array, robot: RobotLimits, dt: Scalar, v_samples: int,
                     yaw_rate_samples: int) -> tuple[jax.Array, jax.Array]:
     """[V] speeds and [N] yaw rates: [v ± a·dt] ∩ [v_min, v_max] and likewise the yaw rate, evenly, ends included.
 
@@ -52,7 +53,7 @@ def velocity_window(v: jax.Array, yaw_rate: jax.Array, robot: RobotLimits, dt: j
     return speeds, yaw_rates
 
 
-def _samples(value: jax.Array, reach: jax.Array, least: jax.Array | float, most: jax.Array | float,
+def _samples(value: jax.Array, reach: Scalar, least: Scalar, most: Scalar,
              count: int) -> jax.Array:
     # A robot already beyond its limits gets the one value that brings it nearest to them.
     low = jnp.clip(least, value - reach, value + reach)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from adwa_jax.grid import Grid
-from adwa_jax.obstacles import movers_at
+from adwa_jax.obstacles import MoverStates, movers_at
 from adwa_jax.scenario import Movers, Scenario, UnknownSquares
 from scenarios.errors import InputError
 from scenarios.suite import Suite
@@ -152,7 +152,7 @@ def mover_ways(movers: Movers, seconds: float) -> np.ndarray:
     times = np.arange(0.0, seconds + TRACK_STEP / 2, TRACK_STEP).astype(np.float32)
     if np.shape(movers.valid) == (0,):
         return np.zeros((len(times), 0, 2), np.float32)
-    states = jax.vmap(movers_at, in_axes=(None, 0))(jax.device_put(movers), jax.device_put(times))
+    states = _movers_at_all(movers, jax.device_put(times))
     return np.where(np.asarray(states.present)[..., None], np.asarray(states.position), np.float32(np.nan))
 
 
@@ -200,6 +200,11 @@ def figure_legend(figure: "Figure", axes: Sequence["Axes"]) -> None:
     columns = max(1, ceil(len(kinds) / rows))
     figure.legend(list(kinds.values()), list(kinds), loc="outside lower center", ncols=columns, fontsize=FONT - 1,
                   frameon=False, handler_map=_handlers())
+
+
+@jax.jit
+def _movers_at_all(movers: Movers, times: jax.Array) -> MoverStates:
+    return jax.vmap(movers_at, in_axes=(None, 0))(movers, times)
 
 
 def _draw_tile(scenario: Scenario, name: str, ax: "Axes") -> None:

@@ -20,7 +20,7 @@ def data_folder() -> Path:
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption("--every-query", action="store_true", help="check every MovingAI query, on large maps too (minutes)")
+    parser.addoption("--every-query", action="store_true", help="every MovingAI query, not a sample (minutes)")
 
 
 @pytest.fixture(scope="session")

@@ -1,16 +1,23 @@
 """What the command line shows while it works and when it is done."""
 
+import sys
 import threading
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import Any
 
+from rich import box
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
+from rich.text import Text
 
+from adwa_jax.astar import Status
 from tuning.results import OVER_ALL, Results
 
 PATIENCE = 2.0  # [s] work shorter than this shows no bar
+MOST_ROWS = 20  # of a table of plans
 
 UNITS = {  # of the measures a table shows
     "time": "s", "length": "m", "length_ratio": "", "spl": "", "breaking_points": "", "danger_points": "",
@@ -20,16 +27,25 @@ UNITS = {  # of the measures a table shows
 }  # fmt: skip
 
 
-def stderr() -> Console:
-    """Where bars and notes go, so that standard output holds results only."""
-    return Console(stderr=True)
+def note(text: str) -> None:
+    """A line beside the results, on standard error, so that standard output holds results only."""
+    print(text, file=sys.stderr)
+
+
+def show(table: Table) -> None:
+    """Print a table."""
+    Console().print(table)
 
 
 @contextmanager
 def progress_bar(title: str, quiet: bool) -> Iterator[Callable[[int, int], None]]:
-    """A function (done, total) that moves a bar, which appears once the work has lasted `PATIENCE` seconds."""
-    columns = (TextColumn(title), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn())
-    bar = Progress(*columns, console=stderr(), transient=True, disable=quiet)
+    """A function (done, total) that moves a bar, which appears once the work has lasted `PATIENCE` seconds.
+
+    The bar is on standard error, and only where that is a terminal.
+    """
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
+               TimeRemainingColumn())  # fmt: skip
+    bar = Progress(*columns, console=Console(stderr=True), transient=True, disable=quiet)
     task = bar.add_task(title, total=None)
     timer = threading.Timer(PATIENCE, bar.start)
     timer.daemon = True
@@ -38,24 +54,52 @@ def progress_bar(title: str, quiet: bool) -> Iterator[Callable[[int, int], None]
         yield lambda done, total: bar.update(task, completed=done, total=total)
     finally:
         timer.cancel()
-        bar.stop()
+        timer.join()
+        bar.live.stop()  # bar.stop() prints an empty line where there is no terminal
 
 
 def results_table(results: Results) -> Table:
     """Outcomes with their share, success with its interval, and the means beside it."""
     summary = results.summary()
     low, high = summary["success_ci"]
-    successes = int(results.reached.sum())
-    table = Table(title=f"{results.suite}: {results.count} scenarios", title_justify="left")
+    table = _table(f"{results.suite}: {results.count} scenarios", "", "", left=1)
     table.add_column("")
-    table.add_column("value", justify="right")
-    table.add_column("")
-    table.add_row("success rate", f"{summary['success_rate']:.1%}", f"95 % interval {low:.1%} … {high:.1%} (Wilson)")
+    table.add_row("success rate", f"{summary['success_rate']:.1%}", f"95 %: {low:.1%} … {high:.1%} (Wilson)")
     for name, count in summary["outcomes"].items():
         table.add_row(name, str(count), f"{count / results.count:.1%}")
     table.add_section()
+    successes = f"mean, {int(results.reached.sum())} successes"
     for name, mean in summary["means"].items():
-        over = f"all {results.count}" if name in OVER_ALL else f"the {successes} successes"
         shown = "–" if mean is None else f"{mean:.3f} {UNITS.get(name, '')}".rstrip()
-        table.add_row(name, shown, f"mean over {over}")
+        table.add_row(name, shown, f"mean, all {results.count}" if name in OVER_ALL else successes)
     return table
+
+
+def plans_table(records: list[dict[str, Any]]) -> Table:
+    """The first `MOST_ROWS` plans, from their JSON objects, under a count of how they ended."""
+    counts = Counter(record["status"] for record in records)
+    title = ", ".join(f"{counts[status.name]} {status.name}" for status in Status if counts[status.name])
+    columns = {"status": "status", "length": "length", "expected": "listed", "expansions": "expanded",
+               "breaking_points": "turns", "danger_points": "danger", "key_point_length": "key-point"}  # fmt: skip
+    shown = {name: heading for name, heading in columns.items() if name in records[0]}
+    table = _table(title, "start", "goal", *shown.values(), left=2)
+    for record in records[:MOST_ROWS]:
+        points = [f"{record[end][0]:g},{record[end][1]:g}" for end in ("start", "goal")]
+        table.add_row(*points, *(_cell(record[name]) for name in shown))
+    if len(records) > MOST_ROWS:
+        table.caption = f"{len(records) - MOST_ROWS} more (--json has them all)"
+    return table
+
+
+def _table(title: str, *headings: str, left: int) -> Table:
+    """An empty table, the first `left` columns flush left; a title may hold brackets, which rich takes for markup."""
+    table = Table(title=Text(title), title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    for index, heading in enumerate(headings):
+        table.add_column(heading, justify="left" if index < left else "right", no_wrap=True)
+    return table
+
+
+def _cell(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.4f}" if value == 0 or 1e-2 <= value < 1e6 else f"{value:.4g}"
+    return "–" if value is None else str(value)

@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 SIZES = (15, 20, 25)
 PAPER_SUCCESS = 0.956  # §3.4, "in the test scenario"
 QUANTITIES = ("path length [cells]", "breaking points", "danger points", "expansions")
-# Table 1, size: ((improved, traditional) of each quantity); it has no expansions. The paper's second row is headed "15*15" again; its text
-# speaks of 15, 20 and 25.
+# Table 1, size: ((improved, traditional) of each quantity); it has no expansions. The paper's second row is headed
+# "15*15" again; its text speaks of 15, 20 and 25.
 NO_FIGURE = (None, None)
 PAPER_TABLE = {
     15: ((18.8283, 18.1421), (5, 7), (0, 5), NO_FIGURE),
@@ -37,13 +37,13 @@ PAPER_TABLE = {
 DIFFERENCES = """\
 What differs from the paper, plainly:
 
-- The paper shows one map a size and none of its data; these are means over {count} random maps a size (20 % of the cells
-  occupied, corners free, solvable), so single figures need not agree. Intervals are 95 % of the mean.
+- The paper shows one map a size and none of its data; these are means over {count} random maps a size (20 % of the
+  cells occupied, corners free, solvable), so single figures need not agree. Intervals are 95 % of the mean.
 - Improved: the key-point polyline of the improved A*. Traditional: the grid path of A* that may cut corners, ω = 1. The
   traditional path is mostly shorter and straighter, because it squeezes past obstacle corners: that is what its danger
   points count. The paper's two larger maps show the reverse; over many maps it does not hold.
-- Expansions are of the improved A* with our ω constants; eq. 5 by node does not save any on these maps unless its constants
-  are tuned.
+- Expansions are of the improved A* with our ω constants; eq. 5 by node does not save any on these maps unless its
+  constants are tuned.
 - Danger points of a key-point path are corners of occupied cells nearer than a tenth of a cell to it.
 - The paper gives no constants but the thresholds 1.5 and 0.5; ours are in `adwa_jax/presets.py`. Its 95.6 % success is
   for "the test scenario", after choosing weights on it. Ours is on random maps with {squares} unknown squares and the
@@ -162,8 +162,10 @@ def _rows(reports: list[SizeReport]) -> list[list[str]]:
         figures = zip(measured(report).items(), PAPER_TABLE[report.size], strict=True)
         for (quantity, (improved, traditional)), (paper_improved, paper_traditional) in figures:
             difference = [a - b for a, b in zip(improved, traditional, strict=True)]
-            rows.append([f"{report.size} x {report.size}", quantity, _interval(improved), _interval(traditional),
-                         _interval(difference, sign="+"), _figure(paper_improved), _figure(paper_traditional)])  # fmt: skip
+            rows.append([
+                f"{report.size} x {report.size}", quantity, _interval(improved), _interval(traditional),
+                _interval(difference, sign="+"), _figure(paper_improved), _figure(paper_traditional),
+            ])  # fmt: skip
     return rows
 
 

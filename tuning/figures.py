@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 
 from adwa_jax.astar import Status
@@ -35,6 +36,7 @@ from scenarios.drawing import (
     mover_ways,
     new_figure,
 )
+from scenarios.padding import ladder_size
 from tuning.intervals import wilson
 from tuning.planning import PlannedPath
 
@@ -54,6 +56,7 @@ SENTENCES = {
     Outcome.NO_PATH: "found no path",
 }
 PLANNERS = {"improved": "Improved A*", "traditional": "Traditional A*", "dijkstra": "Dijkstra"}
+_danger_steps, _danger_corners, _turning_points = map(jax.jit, (danger_steps, danger_corners, turning_points))
 COLLISIONS = (Outcome.HIT_KNOWN, Outcome.HIT_UNKNOWN, Outcome.HIT_MOVER)
 
 
@@ -115,7 +118,7 @@ def drive_figure(scenario: Scenario, plan: Plan, episode: Episode, trace: Trace,
     are pale too. A collision is crossed. Unbatched; the plan and trace may be padded. title: put before the outcome.
     """
     ax = draw_map(scenario.grid, ax, y_down)
-    steps, seconds = int(trace.length), float(episode.measures.time)
+    steps = int(trace.length)
     ways = driven_ways(scenario, trace)
     radius = np.asarray(scenario.movers.radius)
     draw_ends(scenario.start[:2], scenario.goal, ax)
@@ -129,7 +132,7 @@ def drive_figure(scenario: Scenario, plan: Plan, episode: Episode, trace: Trace,
     path = driven_path(scenario, trace)
     ax.plot(*path.T, color=VERMILLION, linewidth=2.0, zorder=6, label="driven path", solid_joinstyle="round")
     _draw_last(path[-1], Outcome(int(episode.outcome)), ax)
-    ax.set_title(f"{prefixed(title)}{drive_sentence(plan, episode, seconds)}", fontsize=FONT)
+    ax.set_title(f"{prefixed(title)}{drive_sentence(plan, episode)}", fontsize=FONT)
     if legend:
         legend_below(ax)
     return figure_of(ax)
@@ -147,20 +150,19 @@ def success_figure(rates: Mapping[str, tuple[int, int]], paper: float | None = P
     share = np.array([successes / max(count, 1) for successes, count in rates.values()])
     low, high = np.array([wilson(successes, count) for successes, count in rates.values()]).T
     ax.bar(place, 100 * share, width=0.6, color=SKY, edgecolor=BLACK, linewidth=0.8, zorder=2)
-    ax.errorbar(place, 100 * share, 100 * np.array([share - low, high - share]), fmt="none", ecolor=BLACK,
-                capsize=4, zorder=3)
-    for x, (successes, count) in zip(place, rates.values(), strict=True):
-        ax.text(float(x), 3, f"{successes / max(count, 1):.1%}\n{successes} of {count}", ha="center", va="bottom",
-                fontsize=FONT - 1, zorder=4)
+    spread = np.maximum(np.array([share - low, high - share]), 0.0)  # rounding may leave −0
+    ax.errorbar(place, 100 * share, 100 * spread, fmt="none", ecolor=BLACK, capsize=4, zorder=3)
     if paper is not None:
         ax.axhline(100 * paper, color=VERMILLION, linestyle="--", linewidth=1.5, zorder=1,
-                   label=f"paper: {paper:.1%} in “the test scenario”")
-    ax.set_xticks(place, list(rates), fontsize=FONT)
+                   label=f"paper: {100 * paper:.1f} % in “the test scenario”")
+    counts = [f"{name}\n{100 * part:.1f} %\n{successes} of {count}"
+              for (name, (successes, count)), part in zip(rates.items(), share, strict=True)]  # fmt: skip
+    ax.set_xticks(place, counts)
     ax.set(ylim=(0, 104), xlim=(-0.6, len(rates) - 0.4))
     ax.set_ylabel("success rate [%], 95 % interval", fontsize=FONT)
     ax.tick_params(labelsize=FONT - 1)
     if paper is not None:
-        legend_below(ax, columns=1)
+        figure_legend(figure_of(ax), [ax])
     return figure_of(ax)
 
 
@@ -193,10 +195,11 @@ def danger_points(grid: Grid, planned: PlannedPath, route: Route) -> np.ndarray:
     points = planned.path if route == "path" else planned.key_points
     if len(points) < 2:
         return np.zeros((0, 2), np.float32)
-    grid, cells, count = _on_device(grid, _cells_of(grid, points), np.int32(len(points)))
+    cells, count = _padded_cells(grid, points)
     if route == "path":
-        return ((points[:-1] + points[1:]) / 2)[np.asarray(danger_steps(grid, cells, count))]
-    corners = np.argwhere(np.asarray(danger_corners(grid, KeyPoints(cells, count))))
+        passed = np.asarray(_danger_steps(grid, cells, count))[: len(points) - 1]
+        return ((points[:-1] + points[1:]) / 2)[passed]
+    corners = np.argwhere(np.asarray(_danger_corners(grid, KeyPoints(cells, count))))
     return corners[:, ::-1] * float(grid.resolution) + np.asarray(grid.origin)
 
 
@@ -226,13 +229,13 @@ def route_sentence(planned: PlannedPath, route: Route) -> str:
     return f"{length:.2f} m, {breaking} breaking and {danger} danger points"
 
 
-def drive_sentence(plan: Plan, episode: Episode, seconds: float) -> str:
+def drive_sentence(plan: Plan, episode: Episode) -> str:
     """How a drive ended, and in a second line what it took."""
     outcome, measures = Outcome(int(episode.outcome)), episode.measures
     ending = "a mover ran into the standing robot" if bool(episode.hit_while_stopped) else SENTENCES[outcome]
     if outcome == Outcome.NO_PATH:
         return ending
-    return (f"{ending} after {seconds:.1f} s\n{float(measures.length):.2f} m driven, "
+    return (f"{ending} after {float(measures.time):.1f} s\n{float(measures.length):.2f} m driven, "
             f"{float(plan.key_point_length):.2f} m planned, least clearance {float(measures.least_clearance):.2f} m")
 
 
@@ -266,7 +269,7 @@ def _draw_route(grid: Grid, planned: PlannedPath, route: Route, ax: "Axes") -> N
     """The grid path, its turning points without the ends, and its danger points."""
     path = planned.path
     ax.plot(*path.T, color=BLUE, linewidth=2.2, zorder=4, label="grid path", **_haloed())
-    turning = np.asarray(turning_points(*_on_device(_cells_of(grid, path), np.int32(len(path)))))
+    turning = np.asarray(_turning_points(*_padded_cells(grid, path)))[: len(path)]
     breaking = path[turning][1:-1]
     ax.plot(*breaking.T, linestyle="none", marker="o", markersize=4.5, markerfacecolor="white", markeredgecolor=BLUE,
             zorder=5, label="breaking point" if len(breaking) else "_")
@@ -280,7 +283,7 @@ def _draw_rings(grid: Grid, planned: PlannedPath, route: Route, ax: "Axes") -> N
         return
     size = float(np.clip(0.9 * _cell_size(grid, ax), 7.0, 16.0))
     ax.plot(*points.T, linestyle="none", marker="o", markersize=size, markerfacecolor="none", zorder=7,
-            markeredgecolor=VERMILLION, markeredgewidth=1.8, label="danger point")
+            markeredgecolor=VERMILLION, markeredgewidth=size / 8, label="danger point")
 
 
 def _cell_size(grid: Grid, ax: "Axes") -> float:
@@ -321,10 +324,12 @@ def _haloed() -> dict[str, Any]:
     return {"path_effects": [withStroke(linewidth=3.6, foreground="white")]}
 
 
-def _cells_of(grid: Grid, points: np.ndarray) -> np.ndarray:
-    """[..., 2] int32 (row, col) of the cells that hold points (x, y) [m]."""
-    return np.floor((points - np.asarray(grid.origin)) / float(grid.resolution))[..., ::-1].astype(np.int32)
+def _padded_cells(grid: Grid, points: np.ndarray) -> tuple[jax.Array, jax.Array]:
+    """[P, 2] int32 (row, col) of the cells that hold points (x, y) [m], and how many count; the last repeats.
 
-
-def _on_device(*trees: Any) -> list[Any]:
-    return [jax.device_put(tree) for tree in trees]
+    P is a rung of the ladder, so that few lengths are compiled.
+    """
+    cells = np.floor((points - np.asarray(grid.origin)) / float(grid.resolution))[:, ::-1].astype(np.int32)
+    count, mode = len(cells), "edge" if len(cells) else "constant"
+    padded = np.pad(cells, ((0, ladder_size(count) - count), (0, 0)), mode=mode)
+    return jnp.asarray(padded), jnp.int32(count)

@@ -18,10 +18,11 @@ from adwa_jax.heuristic_weight import Scope, WeightRule
 from adwa_jax.metrics import PlannedMeasures
 from adwa_jax.plan import plan
 from adwa_jax.presets import paper
+from scenarios.formats import MapFile
 from scenarios.padding import ladder_size, pad_grid
 
 Planner = Literal["improved", "traditional", "dijkstra"]
-DECIMALS = 4  # of coordinates in JSON: a tenth of a millimetre, beyond which float32 on a map of 1 km knows nothing
+DECIMALS = 4  # of coordinates in JSON, at least; a thousandth of a cell where that is finer
 WORKERS = 2  # searches side by side; one alone keeps one core busy
 
 
@@ -120,12 +121,30 @@ def _plan(grid: Grid, query: jax.Array, constants: Constants, options: PlanOptio
     return _Found(*(getattr(found, name) for name in _Found._fields))
 
 
-def as_json(answer: PlannedPath, to_world: Callable[[np.ndarray], np.ndarray], expected: Any = None,
+def why_blocked(map_file: MapFile, point: np.ndarray, robot_radius: float) -> str:
+    """Why no search can start or end at a point [2] (x, y) [m], grid frame, and what to do: "rule; remedy"."""
+    height, width = map_file.occupied.shape
+    low, side = np.asarray(map_file.origin, np.float32), np.float32(map_file.resolution)
+    column, row = np.floor((np.asarray(point, np.float32) - low) / side).tolist()  # float32, as the kernels see it
+    if not (0 <= row < height and 0 <= column < width):
+        (x0, y0), (x1, y1) = map_file.origin, low + side * np.array([width, height], np.float32)
+        frame = " in its own frame" if map_file.yaw else ""
+        return f"lies outside the map, which spans x {x0:g}..{x1:g}, y {y0:g}..{y1:g} m{frame}; choose a point on it"
+    if map_file.occupied[int(row), int(column)]:
+        return "lies in an obstacle; choose a free point"
+    if map_file.unknown[int(row), int(column)]:
+        return "lies in an unknown cell; choose a known one, or count them as free with --unknown free"
+    return (f"is too near to an obstacle or the border for --robot-radius {robot_radius:g}; choose a point with more "
+            "room or a smaller radius")
+
+
+def as_json(answer: PlannedPath, map_file: MapFile, expected: float | None = None,
             listed: bool = False) -> dict[str, Any]:
     """The command line's JSON object for one query, in the world's frame; `expected` where the file lists one."""
+    decimals = max(DECIMALS, 3 - math.floor(math.log10(map_file.resolution)))
 
     def world(points: Any) -> list:
-        return np.round(to_world(np.asarray(points, np.float64)), DECIMALS).tolist()
+        return np.round(map_file.to_world(np.asarray(points, np.float64)), decimals).tolist()
 
     record = {
         "start": world(answer.start),

@@ -1,5 +1,6 @@
 """One scenario driven with its path kept, for pictures and animations."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -13,9 +14,9 @@ from adwa_jax.plan import Plan, plan
 from adwa_jax.presets import Preset
 from adwa_jax.scenario import Scenario
 from adwa_jax.simulate import Episode, Outcome, Trace, trace
-from scenarios.errors import InputError
 from scenarios.padding import pad, padded_shape
 from tuning.evaluate import batch_of, planned_columns
+from tuning.outputs import save_figure
 
 
 @dataclass(frozen=True)
@@ -26,6 +27,7 @@ class Replay:
     plan: Plan
     episode: Episode
     trace: Trace
+    robot_radius: float  # [m]
 
     @property
     def outcome(self) -> Outcome:
@@ -52,10 +54,10 @@ def replay(scenario: Scenario, config: Preset) -> Replay:
     """Plan and drive one scenario, keeping the path."""
     constants = jax.tree.map(np.float32, config.constants)
     batch = batch_of(scenario, constants, config.options)
-    steps = round(float(scenario.time_limit) / float(constants.behaviour.dt))
+    steps = int(np.round(scenario.time_limit / constants.behaviour.dt))  # in float32, as the episode counts them
     padded = pad(scenario, padded_shape(scenario))
     planned, episode, path = jax.device_get(_replay(padded, constants, batch.options, steps))
-    return Replay(scenario, planned, episode, path)
+    return Replay(scenario, planned, episode, path, float(constants.robot.radius))
 
 
 @partial(jax.jit, static_argnames=("options", "steps"))
@@ -64,22 +66,18 @@ def _replay(scenario: Scenario, constants: Constants, options: Options, steps: i
     return planned, *trace(scenario, planned, constants, options, steps)
 
 
-def draw_replay(driven: Replay, title: str, figure: Path, animation: Path | None) -> list[Path]:
-    """Write the picture (as Fig. 4) and, if asked for, the animation; returns the files written."""
-    import matplotlib.pyplot as plt
+def draw_replay(driven: Replay, title: str, figure: Path, animation: Path | None = None, y_down: bool = False,
+                progress: Callable[[int, int], None] | None = None) -> list[Path]:
+    """Write the picture (as Fig. 4) and, if asked for, the animation; returns the files written.
 
+    Raises InputError for an animation that is no .gif or .mp4, and for .mp4 without ffmpeg.
+    """
     from tuning.animation import animate_drive
     from tuning.figures import drive_figure
 
     parts = (driven.scenario, driven.plan, driven.episode, driven.trace)
-    try:
-        picture = drive_figure(*parts, title=title)
-        picture.savefig(figure, dpi=150)
-        plt.close(picture)
-        if animation:
-            animate_drive(animation, *parts, title=title)
-    except InputError:
-        raise
-    except ValueError as error:
-        raise InputError(f"{figure if not figure.exists() else animation}: {error}") from None
-    return [figure, animation] if animation else [figure]
+    save_figure(drive_figure(*parts, title=title, y_down=y_down), figure)
+    if animation is None:
+        return [figure]
+    return [figure, animate_drive(animation, *parts, title=title, y_down=y_down, robot_radius=driven.robot_radius,
+                                  progress=progress)]

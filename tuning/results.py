@@ -12,7 +12,8 @@ import numpy as np
 from adwa_jax.simulate import Outcome
 from tuning.intervals import wilson
 
-OVER_ALL = ("spl", "barn_score")  # success is part of their definition: their means are over all scenarios
+# Their means are over all scenarios: success is part of the first two, and the third never comes with it.
+OVER_ALL = ("spl", "barn_score", "hit_while_stopped")
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,7 @@ class Results:
             "outcomes": self.outcomes(),
             "success_rate": successes / self.count,
             "success_ci": list(wilson(successes, self.count)),
-            "means_over": f"successes ({successes}); {' and '.join(OVER_ALL)}: all scenarios",
+            "means_over": f"successes ({successes}); {', '.join(OVER_ALL)}: all scenarios",
             "means": self.means(),
             "scenarios": [self.scenario(index) for index in range(self.count)],
         }
@@ -71,7 +72,7 @@ class Results:
         folder.mkdir(parents=True, exist_ok=True)
         summary = self.summary()
         (folder / "results.json").write_text(json.dumps(summary, indent=1) + "\n")
-        with (folder / "results.csv").open("w", newline="") as file:
+        with (folder / "results.csv").open("w", newline="", encoding="utf-8") as file:
             writer = csv.DictWriter(file, fieldnames=list(summary["scenarios"][0]))
             writer.writeheader()
             writer.writerows(summary["scenarios"])

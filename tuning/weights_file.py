@@ -17,6 +17,7 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import TypeVar
 
+import jax
 import numpy as np
 
 from adwa_jax.constants import Constants
@@ -89,7 +90,7 @@ def _require(path: Path, values: dict[str, float], keys: tuple[str, ...]) -> Non
 def _made(where: str, kind: type[Kind], values: dict[str, float]) -> Kind:
     """The constants; refused as well if only rounding to float32, in which they are used, breaks their rule."""
     try:
-        kind(**{key: np.float32(value) for key, value in values.items()})
+        kind(**jax.tree.map(np.float32, values))
         return kind(**values)
     except ValueError as error:
         raise InputError(f"{where}: {error}") from None

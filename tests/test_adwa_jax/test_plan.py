@@ -12,6 +12,7 @@ import pytest
 
 from adwa_jax.astar import SearchOptions, Status
 from adwa_jax.constants import PlanOptions
+from adwa_jax.heuristic_weight import WeightRule
 from adwa_jax.plan import plan
 from adwa_jax.presets import paper
 from tests.reference import astar as astar_reference
@@ -22,7 +23,12 @@ from tests.reference import metrics as metrics_reference
 from tests.test_adwa_jax.worlds import counting, drawn, grid_of, random_map
 
 RULE = {"dense_base": 0.25, "dense_gain": 0.5, "sparse_base": 1.25, "sparse_gain": 0.5}
-CONSTANTS = replace(paper().constants, weight_rule=replace(paper().constants.weight_rule, **RULE))
+CONSTANTS = replace(
+    paper().constants,
+    weight_rule=WeightRule(**RULE),
+    robot=replace(paper().constants.robot, radius=0.25),
+    behaviour=replace(paper().constants.behaviour, clearance_margin=0.25),
+)
 NODE = PlanOptions(subdivision=2)
 TRADITIONAL = PlanOptions(SearchOptions(corner_rule="always", stop_rule="generated"), scope="one", inflate=False,
                           subdivision=2)

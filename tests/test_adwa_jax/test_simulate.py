@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from functools import partial
 
 import chex
 import jax
@@ -9,20 +10,29 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from adwa_jax.constants import Options, PlanOptions
+from adwa_jax.constants import Behaviour, Options, PlanOptions
 from adwa_jax.dwa import DwaOptions
 from adwa_jax.plan import plan
 from adwa_jax.presets import paper
 from adwa_jax.scenario import Movers, Scenario, UnknownSquares
+from adwa_jax.score import ScoreWeights
 from adwa_jax.simulate import Outcome, drive, trace
+from adwa_jax.window import RobotLimits
 from tests.reference import distance as distance_reference
 from tests.reference import metrics as metrics_reference
 from tests.reference.dwa import square_distance
 from tests.test_adwa_jax.worlds import SHAPE, counting, drawn, grid_of, random_map
 
 OPTIONS = Options(plan=PlanOptions(subdivision=2), dwa=DwaOptions(5, 9, 10))
-CONSTANTS = paper().constants
 DT = 0.1
+CONSTANTS = replace(
+    paper().constants,
+    weights=ScoreWeights(local_heading=0.8, clearance=0.3, velocity=0.8, global_heading=0.1),
+    robot=RobotLimits(radius=0.25, v_min=0.0, v_max=1.0, yaw_rate_max=1.5, acceleration=2.0, yaw_acceleration=6.0,
+                      brake=2.0, yaw_brake=60.0),
+    behaviour=Behaviour(dt=DT, clearance_cap=0.5, clearance_margin=0.25, keypoint_tolerance=1.0, sensor_range=5.0,
+                        danger_clearance=0.1, stuck_radius=0.25, stuck_time=15.0),
+)
 STEPS = 250  # rows kept of a trace; every time limit here is shorter
 CAPACITY = 2  # unknown squares and movers
 
@@ -73,10 +83,11 @@ def driven(world, constants):
     return run(world, constants)[1]
 
 
-@jax.jit
+follow = jax.jit(partial(trace, options=OPTIONS, steps=STEPS))
+
+
 def traced(world, constants):
-    known = plan(world.grid, world.start[:2], world.goal, constants, OPTIONS.plan)
-    return trace(world, known, constants, OPTIONS, STEPS)
+    return follow(world, run(world, constants)[0], constants)
 
 
 def outcome(world, constants=CONSTANTS):

@@ -1,4 +1,4 @@
-"""Search, key points and DWA choices against an independent C++ program, where its source and a compiler are at hand."""
+"""Search, key points and DWA choices against an independent C++ program, where it can be built."""
 
 import importlib.util
 import json
@@ -138,9 +138,8 @@ def _decide_all(scenes) -> Decision:
 
 def _decide_one(occupied, state, local, goal, disc) -> Decision:
     count = disc.shape[0]
-    sensed = Sensed(
-        jnp.zeros((0, 2)), jnp.zeros(0), jnp.zeros(0, bool), disc[:, :2], disc[:, 2:4], disc[:, 4], jnp.ones(count, bool)
-    )
+    no_squares = jnp.zeros((0, 2)), jnp.zeros(0), jnp.zeros(0, bool)
+    sensed = Sensed(*no_squares, disc[:, :2], disc[:, 2:4], disc[:, 4], jnp.ones(count, bool))
     robot = RobotLimits(0.25, 0.0, 1.0, 1.5, acceleration=1.0, yaw_acceleration=3.0, brake=1.0, yaw_brake=1e9)
     weights = ScoreWeights(0.4, 0.2, 0.2, 0.1)
     return decide(

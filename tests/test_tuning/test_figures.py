@@ -1,0 +1,278 @@
+from types import SimpleNamespace
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from matplotlib.colors import to_hex
+from matplotlib.patches import Circle, Rectangle
+from PIL import Image
+
+from adwa_jax.astar import SearchResult, Status
+from adwa_jax.dwa import RobotState
+from adwa_jax.metrics import Measures, PlannedMeasures
+from adwa_jax.obstacles import MoverStates
+from adwa_jax.plan import Plan
+from adwa_jax.simulate import Episode, Outcome, Trace
+from scenarios.drawing import ORANGE
+from scenarios.generators import toy
+from scenarios.generators.assembly import grid_of
+from tuning import animation
+from tuning.animation import animate_drive
+from tuning.figures import Comparison, compare_plans, danger_points, drive_figure, plan_figure, success_figure
+from tuning.intervals import wilson
+from tuning.planning import PlannedPath, plan_paths, planner_constants, planner_options
+
+# Two cells touch at the corner (2, 2), a third lies beside the last diagonal step, which ends at (4, 4).
+GRID = grid_of(np.array([[cell == "#" for cell in row] for row in ("....", "..#.", ".#..", "..#.")]), 1.0)
+CUTTING = np.array([[0, 0], [1, 1], [2, 2], [3, 3]])
+AROUND = np.array([[0, 0], [0, 1], [0, 2], [0, 3], [1, 3], [2, 3], [3, 3]])
+
+
+def centres(cells):
+    return cells[:, ::-1].astype(np.float32) + 0.5
+
+
+def planned(cells, key_cells, **measures):
+    names = (*PlannedMeasures._fields,)
+    return PlannedPath(start=tuple(centres(cells)[0].tolist()), goal=tuple(centres(cells)[-1].tolist()),
+                       status=Status.FOUND, length=4.5, expansions=7, path=centres(cells),
+                       measures={name: measures.get(name, 0) for name in names},
+                       key_points=centres(key_cells), key_point_length=6.0)  # fmt: skip
+
+
+TRADITIONAL = planned(CUTTING, CUTTING[[0, -1]], danger_points=2, key_point_danger_points=2)
+IMPROVED = planned(AROUND, AROUND[[0, 3, 6]], breaking_points=1, key_point_breaking_points=1)
+
+
+def hand_made_plan(cells, key_cells):
+    """As the kernel gives it: padded beyond its counts."""
+    pad = np.repeat(cells[-1:], 3, axis=0)
+    search = SearchResult(np.int32(0), np.concatenate([cells, pad]).astype(np.int32), np.int32(len(cells)),
+                          np.int32(0), np.int32(0), np.int32(7), np.zeros((4, 4), np.int32))  # fmt: skip
+    points = centres(np.concatenate([key_cells, pad]))
+    return Plan(search, np.float32(4.5), points, np.int32(len(key_cells)), np.float32(6.0),
+                PlannedMeasures(*map(np.int32, (1, 2, 3, 4))), np.float32(4.2), None)  # fmt: skip
+
+
+def the(ax, label):
+    (line,) = (line for line in ax.lines if line.get_label() == label)
+    return line
+
+
+def absent(ax, label):
+    return all(line.get_label() != label for line in ax.lines)
+
+
+def test_rings_lie_where_diagonal_steps_pass_corners():
+    # (1,1)→(2,2) goes between (1,2) and (2,1); (2,2)→(3,3) passes (3,2); (0,0)→(1,1) touches nothing.
+    assert danger_points(GRID, TRADITIONAL, "path").tolist() == [[2.0, 2.0], [3.0, 3.0]]
+    assert danger_points(GRID, IMPROVED, "path").tolist() == []
+
+
+def test_rings_of_a_polyline_lie_at_the_corners_it_nearly_touches():
+    # The straight line from corner to corner passes through (2, 2) and (3, 3), corners of occupied cells, and misses
+    # the other corners by 0.7 and more.
+    assert danger_points(GRID, TRADITIONAL, "key points").tolist() == [[2.0, 2.0], [3.0, 3.0]]
+
+
+@pytest.mark.parametrize("planner", ["traditional", "improved"])
+def test_there_are_as_many_rings_as_the_plan_counts_danger_points(planner):
+    counted = 0
+    for seed in range(4):
+        occupied = np.random.default_rng(seed).random((12, 12)) < 0.3
+        occupied[0, 0] = occupied[-1, -1] = False
+        grid = grid_of(occupied, 0.5, (2.0, -3.0))
+        query = np.array([[[2.25, -2.75], [7.75, 2.75]]])
+        (found,) = plan_paths(grid, query, planner_constants(), planner_options(planner))
+        assert len(danger_points(grid, found, "path")) == found.measures["danger_points"]
+        assert len(danger_points(grid, found, "key points")) == found.measures["key_point_danger_points"]
+        counted += found.measures["danger_points"]
+    assert (counted > 0) == (planner == "traditional")
+
+
+def test_rings_follow_resolution_and_origin():
+    grid = grid_of(np.asarray(GRID.occupied), 0.25, (-1.0, 5.0))
+    moved = TRADITIONAL.path * 0.25 + np.array([-1.0, 5.0], np.float32)
+    points = danger_points(grid, SimpleNamespace(path=moved), "path")
+    assert points.tolist() == [[-0.5, 5.5], [-0.25, 5.75]]
+
+
+def test_the_comparison_rings_the_traditional_paths_danger_points_only():
+    figure = compare_plans([Comparison("4 x 4", GRID, TRADITIONAL, IMPROVED)])
+    left, right = figure.axes
+    assert the(left, "danger point").get_xydata().tolist() == [[2.0, 2.0], [3.0, 3.0]]
+    assert absent(right, "danger point")
+    np.testing.assert_array_equal(the(left, "grid path").get_xydata(), TRADITIONAL.path)
+    np.testing.assert_array_equal(the(right, "key-point path").get_xydata(), IMPROVED.key_points)
+    assert the(right, "key point").get_xydata().tolist() == [[3.5, 0.5]]
+    assert left.get_title() == "4 x 4, traditional A*\n4.50 m, 0 breaking and 2 danger points"
+    assert right.get_title() == "4 x 4, improved A*\n6.00 m, 1 breaking and 0 danger points"
+
+
+def test_several_maps_stand_in_columns():
+    figure = compare_plans([Comparison(name, GRID, TRADITIONAL, IMPROVED) for name in "abc"])
+    titles = [ax.get_title().split("\n")[0] for ax in figure.axes]
+    assert titles == [f"{name}, {planner} A*" for planner in ("traditional", "improved") for name in "abc"]
+    figure.canvas.draw()
+    boxes = [ax.title.get_window_extent() for ax in figure.axes] + [figure.legends[0].get_window_extent()]
+    assert not any(box.overlaps(other) for k, box in enumerate(boxes) for other in boxes[k + 1 :])
+
+
+def test_a_plan_shows_path_turns_and_key_points():
+    ax = plan_figure(GRID, IMPROVED, "improved").axes[0]
+    np.testing.assert_array_equal(the(ax, "grid path").get_xydata(), IMPROVED.path)
+    assert the(ax, "breaking point").get_xydata().tolist() == [[3.5, 0.5]]
+    assert the(ax, "key-point path").get_linestyle() == "--"
+    assert ax.get_title().splitlines() == [
+        "Improved A*", "path: 4.50 m, 1 breaking and 0 danger points",
+        "key points: 6.00 m, 1 breaking and 0 danger points"]  # fmt: skip
+
+
+def test_a_plan_of_the_kernel_is_drawn_to_its_counts():
+    ax = plan_figure(GRID, hand_made_plan(AROUND, AROUND[[0, 3, 6]])).axes[0]
+    np.testing.assert_array_equal(the(ax, "grid path").get_xydata(), IMPROVED.path)
+    np.testing.assert_array_equal(the(ax, "key-point path").get_xydata(), IMPROVED.key_points)
+    assert "path: 4.50 m, 1 breaking and 2 danger points" in ax.get_title()
+    assert "key points: 6.00 m, 3 breaking and 4 danger points" in ax.get_title()
+
+
+def test_a_plan_without_a_path_says_why():
+    nothing = np.zeros((0, 2), np.float32)
+    lost = PlannedPath((0.5, 0.5), (3.5, 3.5), Status.UNREACHABLE, 0.0, 9, dict.fromkeys(PlannedMeasures._fields, 0),
+                       nothing, nothing, 0.0)  # fmt: skip
+    for ax in (plan_figure(GRID, lost).axes[0], *compare_plans([Comparison("", GRID, lost, lost)]).axes):
+        assert ax.get_title().endswith("no path: UNREACHABLE")
+        assert the(ax, "start").get_xydata().tolist() == [[0.5, 0.5]]
+
+
+def test_a_map_that_counts_rows_downwards_is_drawn_so():
+    assert plan_figure(GRID, IMPROVED, y_down=True).axes[0].get_ylim() == (4.0, 0.0)
+
+
+SCENARIO = toy.generate(jax.random.key(0), toy.ToySpec(drawing="S..o\n.##.\n>.oG"))
+X, Y = np.array([0.5, 1.0, 1.5]), np.array([2.0, 1.5, 1.5])
+
+
+def trace_of(steps=3, rows=5):
+    """A drive of `steps` steps in arrays of `rows`, its movers and squares padded to 3."""
+    def column(values):
+        return np.concatenate([values, np.repeat(values[-1:], rows - len(values))]).astype(np.float32)
+
+    zero = np.zeros(rows, np.float32)
+    robot = RobotState(column(X), column(Y), zero, zero, zero)
+    mover = np.zeros((rows, 3, 2), np.float32)
+    mover[:, 0] = np.stack([0.5 + 0.5 * np.arange(1, rows + 1), np.full(rows, 0.5)], axis=-1)
+    present = np.tile([True, False, False], (rows, 1))
+    known = np.zeros((rows, 3), bool)
+    known[1:, 0] = True
+    target = np.tile(np.float32([3.5, 0.5]), (rows, 1))
+    return Trace(robot, MoverStates(mover, mover, present), known, target, zero, np.int32(steps))
+
+
+def episode_of(outcome, stopped=False, time=0.3):
+    measures = Measures(*[np.float32(0.0)] * len(Measures._fields))
+    measures = measures._replace(time=np.float32(time), length=np.float32(1.7), least_clearance=np.float32(0.25))
+    return Episode(np.int32(outcome), np.bool_(stopped), np.int32(0), measures)
+
+
+PLAN = hand_made_plan(np.array([[2, 0], [0, 3]]), np.array([[2, 0], [1, 3], [0, 3]]))
+
+
+def test_a_drive_shows_the_planned_path_dashed_and_the_driven_one_solid():
+    ax = drive_figure(SCENARIO, PLAN, episode_of(Outcome.REACHED), trace_of()).axes[0]
+    assert the(ax, "driven path").get_xydata().tolist() == [[0.5, 2.5], [0.5, 2.0], [1.0, 1.5], [1.5, 1.5]]
+    assert the(ax, "driven path").get_linestyle() == "-"
+    assert the(ax, "planned path").get_xydata().tolist() == [[0.5, 2.5], [3.5, 1.5], [3.5, 0.5]]
+    assert the(ax, "planned path").get_linestyle() == "--"
+    assert the(ax, "key point").get_xydata().tolist() == [[3.5, 1.5]]
+    assert absent(ax, "collision")
+
+
+def test_movers_are_shown_where_they_began_and_ended_with_the_way_between():
+    ax = drive_figure(SCENARIO, PLAN, episode_of(Outcome.REACHED), trace_of()).axes[0]
+    discs = [patch for patch in ax.patches if isinstance(patch, Circle)]
+    assert [disc.get_center() for disc in discs] == [pytest.approx((0.5, 0.5)), pytest.approx((2.0, 0.5))]
+    assert the(ax, "way of a mover").get_xydata().tolist() == [[0.5, 0.5], [1.0, 0.5], [1.5, 0.5], [2.0, 0.5]]
+
+
+def test_only_squares_that_were_sensed_are_filled():
+    ax = drive_figure(SCENARIO, PLAN, episode_of(Outcome.REACHED), trace_of()).axes[0]
+    squares = [patch for patch in ax.patches if isinstance(patch, Rectangle)]
+    assert [to_hex(square.get_facecolor()) for square in squares] == [ORANGE.lower(), "#ffffff"]
+    assert [square.get_label() for square in squares] == ["unknown square", "square never sensed"]
+
+
+@pytest.mark.parametrize("outcome", [Outcome.HIT_KNOWN, Outcome.HIT_UNKNOWN, Outcome.HIT_MOVER])
+def test_a_collision_is_crossed(outcome):
+    ax = drive_figure(SCENARIO, PLAN, episode_of(outcome), trace_of()).axes[0]
+    assert the(ax, "collision").get_xydata().tolist() == [[1.5, 1.5]]
+    assert the(ax, "collision").get_marker() == "X"
+
+
+def test_the_title_says_how_the_drive_ended():
+    def title(*given):
+        return drive_figure(SCENARIO, PLAN, episode_of(*given), trace_of(), title="toy").axes[0].get_title()
+
+    assert title(Outcome.REACHED) == (
+        "toy: reached the goal after 0.3 s\n1.70 m driven, 6.00 m planned, least clearance 0.25 m")  # fmt: skip
+    endings = [title(outcome).splitlines()[0] for outcome in Outcome]
+    assert len(set(endings)) == len(Outcome)
+    assert "ran into the standing robot" in title(Outcome.HIT_MOVER, True)
+
+
+def test_a_drive_that_never_began_is_drawn():
+    plan = PLAN._replace(key_point_count=np.int32(0))
+    ax = drive_figure(SCENARIO, plan, episode_of(Outcome.NO_PATH, time=0.0), trace_of(steps=0)).axes[0]
+    assert ax.get_title() == "found no path"
+    assert the(ax, "driven path").get_xydata().tolist() == [[0.5, 2.5]]
+    assert absent(ax, "planned path")
+
+
+def test_bars_carry_wilson_intervals_beside_the_papers_rate():
+    ax = success_figure({"15": (171, 200), "25": (200, 200)}).axes[0]
+    assert [bar.get_height() for bar in ax.patches] == pytest.approx([85.5, 100.0])
+    segments = ax.collections[0].get_segments()
+    low, high = wilson(171, 200)
+    assert segments[0][:, 1] == pytest.approx([100 * low, 100 * high])
+    assert the(ax, "paper: 95.6 % in “the test scenario”").get_ydata() == pytest.approx([95.6, 95.6])
+    assert ax.get_xticklabels()[0].get_text() == "15\n85.5 %\n171 of 200"
+
+
+def test_a_film_shows_the_drive_and_holds_its_end(tmp_path):
+    path = animate_drive(tmp_path / "drive.gif", SCENARIO, PLAN, episode_of(Outcome.REACHED), trace_of(), speed=0.1,
+                         robot_radius=0.25)  # fmt: skip
+    with Image.open(path) as film:
+        assert film.n_frames == 4  # the start and three steps
+        film.seek(3)
+        assert film.info["duration"] == 2000
+
+
+def test_a_long_drive_is_thinned_to_the_most_frames(tmp_path, monkeypatch):
+    monkeypatch.setattr(animation, "MOST_FRAMES", 3)
+    done = []
+    animate_drive(tmp_path / "drive.gif", SCENARIO, PLAN, episode_of(Outcome.HIT_MOVER), trace_of(), speed=0.1,
+                  progress=lambda count, of: done.append((count, of)))  # fmt: skip
+    assert done == [(1, 3), (2, 3), (3, 3)]
+
+
+def test_a_film_of_no_drive_is_one_picture(tmp_path):
+    plan = PLAN._replace(key_point_count=np.int32(0))
+    path = animate_drive(tmp_path / "drive.gif", SCENARIO, plan, episode_of(Outcome.NO_PATH, time=0.0),
+                         trace_of(steps=0))  # fmt: skip
+    with Image.open(path) as film:
+        assert film.n_frames == 1
+
+
+@pytest.mark.parametrize(("name", "complaint"), [("drive.mp4", "ffmpeg"), ("drive.avi", "suffix '.avi'")])
+def test_a_film_that_cannot_be_written_is_refused_before_it_is_drawn(name, complaint, tmp_path, monkeypatch):
+    monkeypatch.setattr("matplotlib.animation.FFMpegWriter.isAvailable", lambda: False)
+    with pytest.raises(ValueError, match=complaint):
+        animate_drive(tmp_path / name, SCENARIO, PLAN, episode_of(Outcome.REACHED), trace_of())
+    assert not list(tmp_path.iterdir())
+
+
+def test_arrays_of_jax_are_drawn_as_those_of_numpy():
+    on_device = jax.tree.map(jnp.asarray, (SCENARIO, trace_of()))
+    ax = drive_figure(on_device[0], PLAN, episode_of(Outcome.STUCK), on_device[1]).axes[0]
+    assert the(ax, "robot, end").get_xydata().tolist() == [[1.5, 1.5]]
