@@ -38,9 +38,9 @@ class DwaOptions:
     normalisation: Normalisation = "sum"
 
     def __post_init__(self) -> None:
-        """Refuse empty windows and horizons."""
-        for name in ("v_samples", "yaw_rate_samples", "horizon_steps"):
-            require_whole(name, getattr(self, name), 1)
+        """Refuse windows without both their ends and empty horizons."""
+        for name, least in (("v_samples", 2), ("yaw_rate_samples", 2), ("horizon_steps", 1)):
+            require_whole(name, getattr(self, name), least)
         require_choice("normalisation", self.normalisation, ("sum", "minmax", "none"))
 
 

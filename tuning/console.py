@@ -64,14 +64,15 @@ def results_table(results: Results) -> Table:
     low, high = summary["success_ci"]
     table = _table(f"{results.suite}: {results.count} scenarios", "", "", left=1)
     table.add_column("")
+    table.show_header = False
     table.add_row("success rate", f"{summary['success_rate']:.1%}", f"95 %: {low:.1%} … {high:.1%} (Wilson)")
     for name, count in summary["outcomes"].items():
         table.add_row(name, str(count), f"{count / results.count:.1%}")
     table.add_section()
-    successes = f"mean, {int(results.reached.sum())} successes"
+    reached = f"mean of {int(results.reached.sum())} reached"
     for name, mean in summary["means"].items():
         shown = "–" if mean is None else f"{mean:.3f} {UNITS.get(name, '')}".rstrip()
-        table.add_row(name, shown, f"mean, all {results.count}" if name in OVER_ALL else successes)
+        table.add_row(name, shown, f"mean of all {results.count}" if name in OVER_ALL else reached)
     return table
 
 

@@ -15,6 +15,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
+from adwa_jax.grid import Grid
 from adwa_jax.scenario import Scenario
 from scenarios.errors import InputError
 from scenarios.formats.leaves import leaf, no_movers, no_squares, numpy_grid
@@ -55,22 +56,29 @@ def load_barn_world(path: str | Path) -> MapFile:
 def load_barn_scenario(world_path: str | Path, path_file: str | Path | None = None) -> Scenario:
     """The benchmark's task in one of its worlds: numpy leaves, no unknown squares, no movers.
 
-    From (-2.25, 3.0), heading +y, to within 1 m of (-2.25, 13.0) in 100 s. The goal lies beyond the world's
-    last cylinder (y = 9.6 m), where Gazebo's ground is open: the map goes on for 32 rows with the columns of
-    the two side walls occupied and all between them free, to y = 14.4 m.
+    From (-2.25, 3.0), heading +y, to within 1 m of (-2.25, 13.0) in 100 s, on `task_grid`.
 
     path_file: the world's `path_<i>.npy`, which gives `reference_length` (`reference_length`); None leaves
     that at 0, for the A*-optimal length.
     """
     world = load_barn_world(world_path)
-    beyond = np.zeros((TASK_ROWS - ROWS, COLUMNS), np.bool_)
-    beyond[:, [0, -1]] = True
     length = 0.0 if path_file is None else reference_length(path_file)
     return Scenario(
-        grid=numpy_grid(np.concatenate([world.occupied, beyond]), RESOLUTION, ORIGIN),
+        grid=task_grid(world.occupied),
         start=leaf(START, np.float32), heading_given=leaf(True, np.bool_), goal=leaf(GOAL, np.float32),
         goal_tolerance=leaf(GOAL_TOLERANCE, np.float32), time_limit=leaf(TIME_LIMIT, np.float32),
         reference_length=leaf(length, np.float32), squares=no_squares(), movers=no_movers())
+
+
+def task_grid(occupied: np.ndarray) -> Grid:
+    """The map of the task, from a world's [64, 30] bool: with the ground on which the goal lies.
+
+    That is beyond the last cylinder (y = 9.6 m), where Gazebo's ground is open: the map goes on for 32 rows with the
+    columns of the two side walls occupied and all between them free, to y = 14.4 m.
+    """
+    beyond = np.zeros((TASK_ROWS - ROWS, COLUMNS), np.bool_)
+    beyond[:, [0, -1]] = True
+    return numpy_grid(np.concatenate([occupied, beyond]), RESOLUTION, ORIGIN)
 
 
 def load_barn_folder(folder: str | Path) -> list[tuple[str, Scenario]]:

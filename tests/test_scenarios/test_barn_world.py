@@ -7,9 +7,11 @@ import math
 import numpy as np
 import pytest
 
+from adwa_jax.astar import Status
 from scenarios.errors import InputError
-from scenarios.formats import load_barn_folder, load_barn_scenario, load_barn_world, load_map
+from scenarios.formats import barn_world, load_barn_folder, load_barn_scenario, load_barn_world, load_map
 from scenarios.formats.barn_world import fill_enclosed, lattice, reference_length
+from tuning.planning import plan_paths, planner_constants, planner_options
 
 MODEL = """<model name='{name}'><static>1</static><pose frame=''>{x} {y} 0 0 0 0</pose><link name='link'>
 <collision name='collision'><geometry>{shape}</geometry></collision>
@@ -240,3 +242,15 @@ def test_the_real_folder_is_a_suite(data_folder):
     suite = load_barn_folder(data_folder / "barn" / "world_files")
     assert [(name, round(float(scenario.reference_length), 4)) for name, scenario in suite] == [
         ("world_0", 13.5923), ("world_1", 12.4312)]
+
+
+@pytest.mark.realdata
+def test_every_world_has_a_path_from_start_to_goal_for_a_robot_of_30_cm(data_folder):
+    worlds = np.load(data_folder / "barn" / "grids.npz")["full"].astype(bool)
+    assert len(worlds) == 125
+    query = np.array([[barn_world.START[:2], barn_world.GOAL]])
+    for world in worlds:
+        grid = barn_world.task_grid(world.T)
+        (answer,) = plan_paths(grid, query, planner_constants(robot_radius=0.30), planner_options("improved"))
+        assert answer.status == Status.FOUND
+        assert answer.length > 9.9
