@@ -125,7 +125,7 @@ def plan_command(
     if figure:
         from tuning.figures import plan_figure
 
-        save_figure(plan_figure(grid, answers[0], planner.value, y_down=map_file.y_down), figure)
+        save_figure(lambda: plan_figure(grid, answers[0], planner.value, y_down=map_file.y_down), figure)
     _exit_by_status(answers, records, queries.listed, map_file, robot_radius)
 
 
@@ -200,8 +200,7 @@ def drive_command(
     with progress_bar("driving", quiet), _sizes_refused(chosen.name):
         driven = replay(chosen.scenarios[index], config)
     with progress_bar("drawing", quiet) as progress:
-        written = draw_replay(driven, f"{chosen.name}, scenario {index}", parent_made(figure),
-                              parent_made(animation) if animation else None, work.y_down, progress)
+        written = draw_replay(driven, f"{chosen.name}, scenario {index}", figure, animation, work.y_down, progress)
     write_json(driven.summary(), json_file)
     if not quiet and json_file != STDOUT:
         print(driven.sentence())
@@ -393,4 +392,4 @@ def _draw_sheet(suite: Suite, path: Path, quiet: bool, limit: int = 24) -> None:
     from scenarios.drawing import contact_sheet
 
     with progress_bar("drawing", quiet):
-        save_figure(contact_sheet(suite, limit=limit), path)
+        save_figure(lambda: contact_sheet(suite, limit=limit), path)

@@ -168,10 +168,10 @@ def _rows(reports: list[SizeReport]) -> list[list[str]]:
 
 def _interval(values: list[float], sign: str = "") -> str:
     mean, low, _ = mean_interval(values)
-    return f"{mean:{sign}.2f} ± {mean - low:.2f}"
+    return f"{mean:{sign}.2f} ±{mean - low:.2f}"
 
 
-HEADINGS = ("map", "quantity", "improved", "traditional", "difference", "paper i.", "paper t.")
+HEADINGS = ("map", "quantity", "improved", "traditional", "difference", "paper i", "paper t")
 
 
 def _title(count: int) -> str:
@@ -203,12 +203,13 @@ def _differences(reports: list[SizeReport], count: int) -> str:
 
 
 def _table1_console(reports: list[SizeReport]) -> Table:
-    title = "Table 1: improved and traditional A*, mean ± 95 %; beside them the paper's single maps"
+    title = "Table 1: improved and traditional A*, mean ± 95 %; paper: one map"
     table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
     for heading in HEADINGS:
         table.add_column(heading, justify="left" if heading in HEADINGS[:2] else "right", no_wrap=True)
     for row in _rows(reports):
-        table.add_row(*row, end_section=row[1] == QUANTITIES[-1])
+        quantity = row[1].removesuffix(" points")  # 80 columns are narrow
+        table.add_row(row[0], quantity, *row[2:], end_section=row[1] == QUANTITIES[-1])
     return table
 
 

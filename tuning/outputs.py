@@ -3,6 +3,9 @@
 import json
 import os
 import sys
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -62,9 +65,21 @@ def json_text(content: Any) -> str:
     return "{\n" + ",\n".join(lines) + "\n}"
 
 
-def save_figure(figure: Any, path: Path) -> None:
-    """Write a matplotlib figure to a picture."""
-    figure.savefig(parent_made(path), dpi=DPI)
+@contextmanager
+def names_as_they_are() -> Iterator[None]:
+    """Pictures drawn in here may name files with `$`, which is no formula, and with letters that the font lacks."""
+    import matplotlib
+
+    with matplotlib.rc_context({"text.parse_math": False}), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph .* missing from font")
+        yield
+
+
+def save_figure(draw: Callable[[], Any], path: Path) -> Path:
+    """Write the matplotlib figure that `draw` returns to a picture; returns the path."""
+    with names_as_they_are():
+        draw().savefig(parent_made(path), dpi=DPI)
+    return path
 
 
 def parent_made(path: Path) -> Path:

@@ -16,7 +16,9 @@ from adwa_jax.scenario import Scenario
 from adwa_jax.simulate import Episode, Outcome, Trace, trace
 from scenarios.padding import pad, padded_shape
 from tuning.evaluate import batch_of, planned_columns
-from tuning.outputs import save_figure
+from tuning.outputs import names_as_they_are, parent_made, save_figure
+
+LEAST_STEPS = 256  # control steps that are kept; doubled until they cover the time limit, so that few programs do
 
 
 @dataclass(frozen=True)
@@ -36,11 +38,12 @@ class Replay:
 
     def summary(self) -> dict[str, Any]:
         """Outcome, measures and the driven path [[x, y], ...] [m]."""
-        measures = {name: np.asarray(value).item() for name, value in self.episode.measures._asdict().items()}
-        planned = {name: np.asarray(value).item() for name, value in planned_columns(self.plan).items()}
-        used = int(self.trace.length)
+        episode, used = self.episode, int(self.trace.length)
+        columns = {**planned_columns(self.plan), "hit_while_stopped": episode.hit_while_stopped,
+                   "brakings": episode.brakings, **episode.measures._asdict()}  # fmt: skip
+        row = {name: np.asarray(value).item() for name, value in columns.items()}
         path = np.stack([self.trace.robot.x[:used], self.trace.robot.y[:used]], axis=-1)
-        return {"outcome": self.outcome.name, **planned, **measures, "driven_path": np.round(path, 4).tolist()}
+        return {"outcome": self.outcome.name, **row, "driven_path": np.round(path, 4).tolist()}
 
     def sentence(self) -> str:
         """What happened, in a line."""
@@ -54,7 +57,8 @@ def replay(scenario: Scenario, config: Preset) -> Replay:
     """Plan and drive one scenario, keeping the path."""
     constants = jax.tree.map(np.float32, config.constants)
     batch = batch_of(scenario, constants, config.options)
-    steps = int(np.round(scenario.time_limit / constants.behaviour.dt))  # in float32, as the episode counts them
+    last_step = int(np.round(scenario.time_limit / constants.behaviour.dt))  # in float32, as the episode counts
+    steps = max(LEAST_STEPS, 1 << (last_step - 1).bit_length())
     padded = pad(scenario, padded_shape(scenario))
     planned, episode, path = jax.device_get(_replay(padded, constants, batch.options, steps))
     return Replay(scenario, planned, episode, path, float(constants.robot.radius))
@@ -76,8 +80,10 @@ def draw_replay(driven: Replay, title: str, figure: Path, animation: Path | None
     from tuning.figures import drive_figure
 
     parts = (driven.scenario, driven.plan, driven.episode, driven.trace)
-    save_figure(drive_figure(*parts, title=title, y_down=y_down), figure)
+    save_figure(lambda: drive_figure(*parts, title=title, y_down=y_down), figure)
     if animation is None:
         return [figure]
-    return [figure, animate_drive(animation, *parts, title=title, y_down=y_down, robot_radius=driven.robot_radius,
-                                  progress=progress)]
+    with names_as_they_are():
+        animate_drive(parent_made(animation), *parts, title=title, y_down=y_down, robot_radius=driven.robot_radius,
+                      progress=progress)
+    return [figure, animation]

@@ -90,7 +90,8 @@ def _require(path: Path, values: dict[str, float], keys: tuple[str, ...]) -> Non
 def _made(where: str, kind: type[Kind], values: dict[str, float]) -> Kind:
     """The constants; refused as well if only rounding to float32, in which they are used, breaks their rule."""
     try:
-        kind(**jax.tree.map(np.float32, values))
-        return kind(**values)
+        made = kind(**values)
+        jax.tree.map(np.float32, made)
+        return made
     except ValueError as error:
         raise InputError(f"{where}: {error}") from None

@@ -1,0 +1,115 @@
+import numpy as np
+import pytest
+
+from adwa_jax.heuristic_weight import WeightRule
+from adwa_jax.presets import paper
+from adwa_jax.score import ScoreWeights
+from scenarios.errors import InputError
+from tuning.weights_file import load_weights, parse_weight_rule
+
+SCORE = {"local_heading": 0.4, "clearance": 0.25, "velocity": 0.6, "global_heading": 0}
+RULE = {"dense_base": 0.5, "dense_gain": 0.5, "sparse_base": 1.25, "sparse_gain": 0.5}
+
+
+@pytest.fixture
+def written(tmp_path):
+    def write(text="", **values):
+        path = tmp_path / "weights.toml"
+        path.write_text(text + "".join(f"{key} = {value}\n" for key, value in values.items()))
+        return path
+
+    return write
+
+
+def refusal(path):
+    with pytest.raises(InputError) as caught:
+        load_weights(path, paper().constants)
+    message = str(caught.value)
+    assert message.startswith(str(path))
+    assert "\n" not in message
+    return message.removeprefix(str(path))
+
+
+def test_score_weights_stand_in_for_the_presets_and_nothing_else_changes(written):
+    loaded = load_weights(written(**SCORE), paper().constants)
+    assert loaded.weights == ScoreWeights(0.4, 0.25, 0.6, 0.0)
+    assert (loaded.weight_rule, loaded.robot, loaded.behaviour) == (
+        paper().constants.weight_rule, paper().constants.robot, paper().constants.behaviour)  # fmt: skip
+
+
+def test_the_rule_may_come_with_or_without_its_thresholds(written):
+    loaded = load_weights(written(**SCORE, **RULE), paper().constants)
+    assert loaded.weight_rule == WeightRule(0.5, 0.5, 1.25, 0.5, 1.5, 0.5)
+    loaded = load_weights(written(**SCORE, **RULE, dense_ratio=2, sparse_ratio=0.25), paper().constants)
+    assert loaded.weight_rule == WeightRule(0.5, 0.5, 1.25, 0.5, 2.0, 0.25)
+
+
+@pytest.mark.parametrize("key", [*SCORE, *RULE])
+def test_a_missing_key_is_named(written, key):
+    values = {name: value for name, value in {**SCORE, **RULE}.items() if name != key}
+    message = refusal(written(**values))
+    assert message.startswith(f": {key}: missing;")
+    assert message.endswith("add it")
+
+
+def test_thresholds_alone_are_no_rule(written):
+    assert "dense_base, dense_gain, sparse_base, sparse_gain: missing" in refusal(written(**SCORE, dense_ratio=1.5))
+
+
+@pytest.mark.parametrize("text", ["clearence = 0.4\n", "[weights]\nclearance = 0.4\n"])
+def test_an_unknown_key_is_named_with_the_known_ones(written, text):
+    message = refusal(written(text=text))
+    assert "unknown key" in message
+    assert "local_heading, clearance" in message
+    assert message.endswith("remove or rename it")
+
+
+@pytest.mark.parametrize("value", ["nan", "inf", "-0.1", "1e300", "1" + "0" * 400, '"0.4"', "true", "[0.4]",
+                                   "1979-05-27"])  # fmt: skip
+@pytest.mark.parametrize("key", ["clearance", "sparse_gain"])
+def test_a_value_that_is_no_weight_is_shown_with_its_key(written, key, value):
+    message = refusal(written(**{**SCORE, **RULE, key: value}))
+    assert message.startswith(f": {key} = ")
+    assert "must be a" in message
+
+
+@pytest.mark.parametrize(("values", "promise"), [
+    ({"dense_base": 0.7}, "must be < 1, so that ω < 1 in dense areas (eq. 5)"),
+    ({"sparse_base": 0.99}, "must be ≥ 1, so that ω > 1 in sparse areas (eq. 5)"),
+    ({"sparse_base": 16.5}, "must be ≤ 16"),
+    ({"dense_ratio": 0.4, "dense_base": 0.0, "dense_gain": 0.1}, "must not exceed dense_ratio"),
+])  # fmt: skip
+def test_a_rule_that_breaks_its_promise_is_refused_with_the_inequality(written, values, promise):
+    message = refusal(written(**SCORE, **{**RULE, **values}))
+    assert promise in message
+
+
+def test_a_rule_that_breaks_its_promise_only_when_rounded_to_float32_is_refused(written):
+    assert np.float32(0.99999999) == 1.0
+    message = refusal(written(**SCORE, **{**RULE, "dense_base": 0.99999999, "dense_gain": 0}))
+    assert "must be < 1" in message
+
+
+@pytest.mark.parametrize("content", [b"clearance 0.4", b"\x89PNG\r\n", b"clearance = 0.4\nclearance = 0.5\n",
+                                     b"a = " + b"1" * 5000, b"a = " + b"[" * 100_000])  # fmt: skip
+def test_what_is_not_toml_is_refused(tmp_path, content):
+    path = tmp_path / "weights.toml"
+    path.write_bytes(content)
+    assert "write lines such as: clearance = 0.4" in refusal(path)
+
+
+def test_a_file_that_is_not_there_and_a_folder_are_refused(tmp_path):
+    assert "No such file" in refusal(tmp_path / "none.toml")
+    assert "Is a directory" in refusal(tmp_path)
+
+
+def test_a_rule_on_the_command_line():
+    assert parse_weight_rule("0.5, 0.25,1.5,0.75") == WeightRule(0.5, 0.25, 1.5, 0.75)
+
+
+@pytest.mark.parametrize("text", ["", "1,2,3", "0.5,0.5,1.2,0.6,1", "a,b,c,d", "0.5,nan,1.2,0.6", "0.5,-0.5,1.2,0.6",
+                                  "0.5,0.5,inf,0.6", "0.9,0.9,1.2,0.6", "0.5,0.5,0.9,0.6"])  # fmt: skip
+def test_a_bad_rule_on_the_command_line_is_refused(text):
+    with pytest.raises(InputError, match=r"^--weight-rule: ") as caught:
+        parse_weight_rule(text)
+    assert "\n" not in str(caught.value)
