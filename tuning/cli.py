@@ -219,6 +219,8 @@ def suite_make_command(
 ) -> None:
     """Write a suite to one file, with the recipe and seed that made it."""
     check_file("--out", out)
+    if out.exists() and not out.is_file():
+        raise InputError(f"--out: {out}; is no regular file, which a suite would replace; name another")
     if name not in SUITE_NAMES and Path(name).is_dir():
         made = suite_from_barn_folder(Path(name))
     else:

@@ -28,17 +28,13 @@ def check_file(option: str, path: Path | None, suffixes: tuple[str, ...] = ()) -
     if path.exists():
         _require_writable(option, path, path)
     else:
-        check_folder(option, path.parent)
+        _check_place(option, path, path.parent)
 
 
 def check_folder(option: str, path: Path | None) -> None:
     """Raises InputError unless files could be written into the folder `path`, made if need be."""
-    if path is None:
-        return
-    nearest = next(folder for folder in (path, *path.parents, Path()) if folder.exists())
-    if not nearest.is_dir():
-        raise bad_input(option, str(path), f"{nearest} is a file", "name a folder that is there or can be made")
-    _require_writable(option, path, nearest)
+    if path is not None:
+        _check_place(option, path, path)
 
 
 def write_json(content: Any, path: Path | None) -> None:
@@ -86,6 +82,14 @@ def parent_made(path: Path) -> Path:
     """The path, its folder made if need be."""
     path.parent.mkdir(parents=True, exist_ok=True)
     return path
+
+
+def _check_place(option: str, path: Path, folder: Path) -> None:
+    """Raises InputError, showing `path`, unless `folder` is there or can be made, and be written into."""
+    nearest = next(place for place in (folder, *folder.parents) if place.exists())
+    if not nearest.is_dir():
+        raise bad_input(option, str(path), f"{nearest} is a file", "name a folder that is there or can be made")
+    _require_writable(option, path, nearest)
 
 
 def _require_writable(option: str, path: Path, place: Path) -> None:

@@ -14,7 +14,7 @@ from adwa_jax.plan import Plan, plan
 from adwa_jax.presets import Preset
 from adwa_jax.scenario import Scenario
 from adwa_jax.simulate import Episode, Outcome, Trace, trace
-from scenarios.padding import pad, padded_shape
+from scenarios.padding import pad, stack
 from tuning.evaluate import batch_of, planned_columns
 from tuning.outputs import names_as_they_are, parent_made, save_figure
 
@@ -59,15 +59,21 @@ def replay(scenario: Scenario, config: Preset) -> Replay:
     batch = batch_of(scenario, constants, config.options)
     last_step = int(np.round(scenario.time_limit / constants.behaviour.dt))  # in float32, as the episode counts
     steps = max(LEAST_STEPS, 1 << (last_step - 1).bit_length())
-    padded = pad(scenario, padded_shape(scenario))
-    planned, episode, path = jax.device_get(_replay(padded, constants, batch.options, steps))
+    lanes = stack([pad(scenario, batch.shape)])
+    planned, episode, path = jax.tree.map(lambda leaf: leaf[0], jax.device_get(
+        _replay(lanes, constants, batch.options, steps)))  # fmt: skip
     return Replay(scenario, planned, episode, path, float(constants.robot.radius))
 
 
 @partial(jax.jit, static_argnames=("options", "steps"))
-def _replay(scenario: Scenario, constants: Constants, options: Options, steps: int) -> tuple[Plan, Episode, Trace]:
-    planned = plan(scenario.grid, scenario.start[:2], scenario.goal, constants, options.plan)
-    return planned, *trace(scenario, planned, constants, options, steps)
+def _replay(lanes: Scenario, constants: Constants, options: Options, steps: int) -> tuple[Plan, Episode, Trace]:
+    """Batched as `evaluate` is, though there is one lane: the same arithmetic, hence the same bits and outcome."""
+
+    def plan_one(scenario: Scenario) -> Plan:
+        return plan(scenario.grid, scenario.start[:2], scenario.goal, constants, options.plan)
+
+    planned = jax.lax.map(plan_one, lanes)
+    return planned, *jax.vmap(lambda one, its: trace(one, its, constants, options, steps))(lanes, planned)
 
 
 def draw_replay(driven: Replay, title: str, figure: Path, animation: Path | None = None, y_down: bool = False,
