@@ -40,6 +40,7 @@ class Status(IntEnum):
 RUNNING = np.int32(-1)
 
 
+@jax.tree_util.register_static
 @dataclass(frozen=True)
 class SearchOptions:
     """Static choices of the search (§2.1, §2.2.1)."""

@@ -15,19 +15,18 @@ def require(holds: Any, field: str, value: object, rule: str, remedy: str) -> No
 
 
 def require_numbers(settings: Any, least: float) -> bool:
-    """Whether every field of a dataclass is a plain number; each must then be finite and ≥ `least`.
+    """Whether every field of a dataclass is a plain number; each that is must be finite and ≥ `least`.
 
-    False, with nothing checked, where a field is an array or a tracer: those were checked when they were numbers.
+    Arrays and tracers pass unseen: they were checked when they were numbers.
     """
     values = {field.name: getattr(settings, field.name) for field in fields(settings)}
     for name, value in values.items():
         require(not isinstance(value, str | bool), name, value, "must be a number", "write it without quotes")
-    if not all(isinstance(value, int | float | np.floating) for value in values.values()):
-        return False
-    for name, value in values.items():
+    plain = {name: value for name, value in values.items() if isinstance(value, int | float | np.floating)}
+    for name, value in plain.items():
         require(math.isfinite(value) and value >= least, name, float(value), f"must be a finite number ≥ {least:g}",
                 "correct it")
-    return True
+    return len(plain) == len(values)
 
 
 def require_choice(field: str, value: str, choices: tuple[str, ...]) -> None:

@@ -53,6 +53,7 @@ class Constants:
     behaviour: Behaviour
 
 
+@jax.tree_util.register_static
 @dataclass(frozen=True)
 class PlanOptions:
     """Static choices of the global plan (§2)."""
@@ -70,6 +71,7 @@ class PlanOptions:
         require_whole("subdivision", self.subdivision, 1)
 
 
+@jax.tree_util.register_static
 @dataclass(frozen=True)
 class Options:
     """All static choices. Another value compiles anew."""

@@ -28,6 +28,7 @@ from adwa_jax.score import (
 from adwa_jax.window import RobotLimits, velocity_window
 
 
+@jax.tree_util.register_static
 @dataclass(frozen=True)
 class DwaOptions:
     """Static choices of a decision: how many candidates, how far ahead, how terms are made comparable."""

@@ -72,6 +72,7 @@ def segment_free(occupied: jax.Array, a: jax.Array, b: jax.Array, margin: jax.Ar
 
     Unbatched. occupied: [H, W] bool; a, b: [2] float32 (x, y) in cells; margin: [] float32, cells.
     """
+    occupied = jnp.asarray(occupied)
     steep = jnp.abs(b[1] - a[1]) > jnp.abs(b[0] - a[0])
     along = jnp.arange(max(occupied.shape), dtype=jnp.int32)
     run, rise = jnp.where(steep, (b - a)[::-1], b - a)

@@ -63,8 +63,10 @@ class Measures(NamedTuple):
 
     time: jax.Array
     length: jax.Array
-    length_ratio: jax.Array  # length ÷ shortest; 0 where there is no shortest path
-    spl: jax.Array  # success · ℓ / max(length, ℓ)
+    # length ÷ ℓ, the shortest 8-connected grid path between cell centres; 0 where ℓ is. Below 1 for a robot that cuts
+    # the grid's corners and may stop short of the goal by its tolerance.
+    length_ratio: jax.Array
+    spl: jax.Array  # success · ℓ / max(length, ℓ); success itself where ℓ = 0
     breaking_points: jax.Array  # [] int32
     danger_points: jax.Array  # [] int32, separate intervals with clearance < danger_clearance
     least_clearance: jax.Array
@@ -177,7 +179,7 @@ def finish_measures(running: Running, success: jax.Array, dt: Scalar, shortest: 
         time=time,
         length=running.length,
         length_ratio=_ratio(running.length, shortest),
-        spl=success * _ratio(shortest, jnp.maximum(running.length, shortest)),
+        spl=success * jnp.where(shortest > 0, _ratio(shortest, jnp.maximum(running.length, shortest)), 1.0),
         breaking_points=running.breaking_points,
         danger_points=running.danger_points,
         least_clearance=jnp.where(running.steps > 0, running.least_clearance, 0.0),

@@ -38,6 +38,7 @@ def plan(grid: Grid, start: jax.Array, goal: jax.Array, constants: Constants, op
     A start or goal off the map or inside the inflated obstacles ends as BAD_START or BAD_GOAL; it is never moved.
     Unbatched.
     """
+    grid, start, goal = jax.tree.map(jnp.asarray, (grid, start, goal))  # suites hold numpy arrays
     start_cell, goal_cell = cell_of(grid, start), cell_of(grid, goal)
     blocked = inflate(grid, constants.robot.radius) if options.inflate else grid.occupied
     found = search(blocked, start_cell, goal_cell, _weight(grid, start_cell, goal_cell, constants, options),

@@ -40,7 +40,7 @@ def paper() -> Preset:
             behaviour=Behaviour(
                 dt=0.1,
                 clearance_cap=0.5,  # two radii: more room than that is no safer
-                clearance_margin=0.1,  # a tenth of a cell: no danger point is left on a planned path
+                clearance_margin=0.25,  # the robot's radius: it can drive along every key-point segment
                 keypoint_tolerance=1.0,  # one cell of the paper's maps
                 sensor_range=5.0,
                 danger_clearance=0.1,  # a tenth of a cell, as for planned paths

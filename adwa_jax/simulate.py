@@ -73,6 +73,7 @@ class Trace(NamedTuple):
 
 def drive(scenario: Scenario, plan: Plan, constants: Constants, options: Options) -> Episode:
     """One episode to its end (§4, Fig. 2). Unbatched; deterministic."""
+    scenario, plan = jax.tree.map(jnp.asarray, (scenario, plan))  # suites hold numpy arrays
 
     def cond_fun(state: EpisodeState) -> jax.Array:
         return state.outcome == RUNNING
@@ -86,6 +87,7 @@ def drive(scenario: Scenario, plan: Plan, constants: Constants, options: Options
 
 def trace(scenario: Scenario, plan: Plan, constants: Constants, options: Options, steps: int) -> tuple[Episode, Trace]:
     """The same episode, its path kept: at most `steps` control steps, which must cover the scenario's time limit."""
+    scenario, plan = jax.tree.map(jnp.asarray, (scenario, plan))
 
     def body_fun(state: EpisodeState, _: None) -> tuple[EpisodeState, tuple]:
         running = state.outcome == RUNNING

@@ -3,6 +3,12 @@
 import re
 from pathlib import Path
 
+import jax
+
+from adwa_jax import Outcome, Status, drive, paper, plan
+from scenarios.suite import make_suite
+from tuning.weights_file import load_weights
+
 ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text()
 
@@ -16,12 +22,18 @@ def test_the_python_example_runs_and_prints_outcomes(capsys):
 
 
 def test_the_weights_example_is_the_paper_presets_constants(tmp_path):
-    from adwa_jax.presets import paper
-    from tuning.weights_file import load_weights
-
     (example,) = re.findall(r"```toml\n(.*?)```", README, re.DOTALL)
     (tmp_path / "weights.toml").write_text(example)
     assert load_weights(tmp_path / "weights.toml", paper().constants) == paper().constants
+
+
+def test_kernels_run_as_they_stand_under_jit():
+    scenario = make_suite("paper-15", 0, 1).scenarios[0]
+    constants, options = paper()
+    planned = jax.jit(plan)(scenario.grid, scenario.start[:2], scenario.goal, constants, options.plan)
+    episode = jax.jit(drive)(scenario, planned, constants, options)
+    assert int(planned.search.status) == Status.FOUND
+    assert int(episode.outcome) in list(Outcome)
 
 
 def test_every_name_and_file_of_the_notation_table_exists():

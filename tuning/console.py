@@ -33,8 +33,10 @@ def note(text: str) -> None:
 
 
 def show(table: Table) -> None:
-    """Print a table."""
-    Console().print(table)
+    """Print a table; a terminal too narrow for it, or none, cuts nothing off."""
+    console = Console()
+    console.width = max(console.width, console.measure(table, options=console.options.update(max_width=1000)).maximum)
+    console.print(table)
 
 
 @contextmanager

@@ -37,12 +37,13 @@ class Replay:
         return Outcome(int(self.episode.outcome))
 
     def summary(self) -> dict[str, Any]:
-        """Outcome, measures and the driven path [[x, y], ...] [m]."""
+        """Outcome, measures and the driven path [[x, y], ...] [m], start included."""
         episode, used = self.episode, int(self.trace.length)
         columns = {**planned_columns(self.plan), "hit_while_stopped": episode.hit_while_stopped,
                    "brakings": episode.brakings, **episode.measures._asdict()}  # fmt: skip
         row = {name: np.asarray(value).item() for name, value in columns.items()}
         path = np.stack([self.trace.robot.x[:used], self.trace.robot.y[:used]], axis=-1)
+        path = np.concatenate([np.asarray(self.scenario.start)[None, :2], path])
         return {"outcome": self.outcome.name, **row, "driven_path": np.round(path, 4).tolist()}
 
     def sentence(self) -> str:

@@ -177,7 +177,8 @@ def test_every_measure_equals_plain_loops(steps):
 def test_nothing_driven_is_finite():
     measures = finished(start_measures(), shortest=0.0, length=0.0)
     assert all(np.isfinite(value) for value in measures)
-    assert float(measures.length) == float(measures.length_ratio) == float(measures.spl) == 0.0
+    assert float(measures.length) == float(measures.length_ratio) == 0.0
+    assert float(measures.spl) == 1.0  # nothing to drive, nothing driven
 
 
 def test_gradients_are_finite_when_standing_still():
