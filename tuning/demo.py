@@ -71,7 +71,7 @@ def run_demo(out: Path, count: int, seed: int, quiet: bool) -> list[SizeReport]:
     config = paper()
     reports = [_report(size, count, seed, config, quiet) for size in SIZES]
     text = "\n".join([_title(count), _table1(reports), _success(reports), _differences(reports, count)])
-    (out / "summary.md").write_text(text)
+    (out / "summary.md").write_text(text, encoding="utf-8")
     with progress_bar("drawing", quiet):
         pictures = _draw(out, reports, config)
     for report in reports:

@@ -118,6 +118,7 @@ def write_suites():
     header = json.loads(arrays["header"].tobytes()) | {"version": 99}
     np.savez("old.npz", **{**arrays, "header": np.frombuffer(json.dumps(header).encode(), np.uint8)})
     Path("worlds").mkdir()
+    os.mkfifo("pipe")
 
 
 @pytest.fixture(scope="module")
@@ -443,7 +444,7 @@ MISTAKES = {
     "json cannot be written": ((*PLAN, "--json", "/proc/no/x.json"), "--json", "/proc/no/x.json", "check its"),
     "json has no room": ((*PLAN, "--json", "/dev/full"), "--json", "/dev/full", "free space"),
     "figure suffix": ((*PLAN, "--figure", "plan.xyz"), "--figure", "plan.xyz", "rename it"),
-    "suite in place of a device": (("suite", "make", "maze", "--out", "/dev/null"), "--out", "/dev/null", "another"),
+    "suite in place of a pipe": (("suite", "make", "maze", "--out", "pipe"), "--out", "pipe", "name another"),
     "suite in place of a folder": (("suite", "make", "maze", "--out", "worlds"), "--out", "worlds", "name a file"),
     "out is a file": ((*EVALUATE, "--out", "bands.map"), "--out", "bands.map", "name a folder"),
     "animation suffix": (("drive", *EVALUATE[1:], "--animation", "d.avi"), "--animation", "d.avi", "rename it"),
@@ -554,8 +555,10 @@ def test_a_bug_keeps_its_traceback(adwa, monkeypatch):
 
 
 def in_a_process(*arguments, stdout=subprocess.PIPE, **settings):
-    """The command as the shell starts it."""
-    return subprocess.Popen([sys.executable, "-c", "from tuning.cli import main; main()", *map(str, arguments)],
+    """The command as a terminal starts it: a background shell has its children ignore Ctrl-C."""
+    code = ("import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
+            "from tuning.cli import main; main()")  # fmt: skip
+    return subprocess.Popen([sys.executable, "-c", code, *map(str, arguments)],
                             stdout=stdout, stderr=subprocess.PIPE, text=True, **settings)  # fmt: skip
 
 

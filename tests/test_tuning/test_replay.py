@@ -34,10 +34,10 @@ def test_a_replay_tells_what_the_evaluation_found(evaluated, replayed, name):
 def test_the_driven_path_leads_from_the_start_to_where_the_episode_ended(replayed):
     for name in NAMES:
         driven = replayed[name]
-        path = np.array(driven.summary()["driven_path"]).reshape(-1, 2)
-        assert len(path) == round(float(driven.episode.measures.time) / 0.1)
-        points = np.concatenate([driven.scenario.start[None, :2], path])
-        length = np.hypot(*np.diff(points, axis=0).T).sum()
+        path = np.array(driven.summary()["driven_path"])
+        assert len(path) == 1 + round(float(driven.episode.measures.time) / 0.1)
+        assert path[0] == pytest.approx(driven.scenario.start[:2], abs=1e-4)
+        length = np.hypot(*np.diff(path, axis=0).T).sum()
         assert length == pytest.approx(float(driven.episode.measures.length), abs=1e-2)
 
 
