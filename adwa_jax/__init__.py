@@ -9,16 +9,18 @@ from adwa_jax.heuristic_weight import WeightRule, heuristic_weight, weight_field
 from adwa_jax.astar import SearchOptions, SearchResult, Status, search
 from adwa_jax.keypoints import KeyPoints, key_points, segment_free, turning_points
 from adwa_jax.window import RobotLimits, velocity_window
-from adwa_jax.rollout import Pose, euler_step, rollout
+from adwa_jax.footprint import covering_discs
+from adwa_jax.rollout import Pose, RobotState, euler_step, rollout
 from adwa_jax.scenario import Movers, Scenario, UnknownSquares
 from adwa_jax.obstacles import Sensed, movers_at, sense
 from adwa_jax.score import ScoreWeights, Terms
-from adwa_jax.dwa import Candidates, Decision, DwaOptions, RobotState, decide
-from adwa_jax.constants import Behaviour, Constants, Options, PlanOptions
+from adwa_jax.rules import EVERY_RULE, RULE_NAMES, Rules
+from adwa_jax.constants import Behaviour, Constants, DwaOptions, Options, PlanOptions
+from adwa_jax.dwa import Candidates, Decision, Guidance, decide
 from adwa_jax.metrics import Measures, PlannedMeasures
 from adwa_jax.plan import Plan, plan
-from adwa_jax.simulate import Episode, Outcome, Trace, drive, trace
-from adwa_jax.presets import PRESETS, Preset, paper
+from adwa_jax.simulate import Episode, Outcome, Trace, drive, drive_lanes, trace
+from adwa_jax.presets import PRESETS, ROBOTS, Preset, extended, jackal, on_robot, paper, preset
 
 __all__ = [  # in the order of the pipeline
     "DistanceField", "Grid", "clearance_at", "distance_field", "inflate",
@@ -27,14 +29,16 @@ __all__ = [  # in the order of the pipeline
     "SearchOptions", "SearchResult", "Status", "search",
     "KeyPoints", "key_points", "segment_free", "turning_points",
     "RobotLimits", "velocity_window",
-    "Pose", "euler_step", "rollout",
+    "covering_discs",
+    "Pose", "RobotState", "euler_step", "rollout",
     "Movers", "Scenario", "UnknownSquares",
     "Sensed", "movers_at", "sense",
     "ScoreWeights", "Terms",
-    "Candidates", "Decision", "DwaOptions", "RobotState", "decide",
-    "Behaviour", "Constants", "Options", "PlanOptions",
+    "EVERY_RULE", "RULE_NAMES", "Rules",
+    "Behaviour", "Constants", "DwaOptions", "Options", "PlanOptions",
+    "Candidates", "Decision", "Guidance", "decide",
     "Measures", "PlannedMeasures",
     "Plan", "plan",
-    "Episode", "Outcome", "Trace", "drive", "trace",
-    "PRESETS", "Preset", "paper",
+    "Episode", "Outcome", "Trace", "drive", "drive_lanes", "trace",
+    "PRESETS", "ROBOTS", "Preset", "extended", "jackal", "on_robot", "paper", "preset",
 ]  # fmt: skip

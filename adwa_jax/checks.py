@@ -15,11 +15,11 @@ def require(holds: Any, field: str, value: object, rule: str, remedy: str) -> No
 
 
 def require_numbers(settings: Any, least: float) -> bool:
-    """Whether every field of a dataclass is a plain number; each that is must be finite and ≥ `least`.
+    """Whether every field of a dataclass is a plain number or a tuple of such; each must be finite and ≥ `least`.
 
     Arrays and tracers pass unseen: they were checked when they were numbers.
     """
-    values = {field.name: getattr(settings, field.name) for field in fields(settings)}
+    values = _flat({field.name: getattr(settings, field.name) for field in fields(settings)})
     for name, value in values.items():
         require(not isinstance(value, str | bool), name, value, "must be a number", "write it without quotes")
     plain = {name: value for name, value in values.items() if isinstance(value, int | float | np.floating)}
@@ -27,6 +27,15 @@ def require_numbers(settings: Any, least: float) -> bool:
         require(math.isfinite(value) and value >= least, name, float(value), f"must be a finite number ≥ {least:g}",
                 "correct it")
     return len(plain) == len(values)
+
+
+def _flat(values: dict[str, Any]) -> dict[str, Any]:
+    """Entries of tuples under names of their own."""
+    flat = {}
+    for name, value in values.items():
+        entries = {f"{name}[{index}]": entry for index, entry in enumerate(value)} if isinstance(value, tuple) else {}
+        flat |= entries or {name: value}
+    return flat
 
 
 def require_choice(field: str, value: str, choices: tuple[str, ...]) -> None:

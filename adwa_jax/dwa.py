@@ -1,58 +1,43 @@
-"""One decision of the (improved) Dynamic Window Approach (§3).
+"""One decision of the (improved) Dynamic Window Approach (§3), and of its extension by `Rules`.
 
 Dimension letters: V speeds, N yaw rates, K predicted points.
 """
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 from jax import lax
 
-from adwa_jax.checks import require_choice, require_whole
+from adwa_jax.admissible import halts_clear, is_admissible
+from adwa_jax.constants import Constants, Options
 from adwa_jax.grid import DistanceField, Scalar, clearance_at
 from adwa_jax.obstacles import NOWHERE, Sensed, clearance_to_movers, clearance_to_squares
-from adwa_jax.rollout import Arcs, Pose, arcs
+from adwa_jax.prediction import Prediction, clearance_now, predict
+from adwa_jax.profiles import Profiles, constant_profiles, speed_targets, turn_targets, two_phase_profiles
+from adwa_jax.rollout import Arcs, Pose, RobotState, arcs
+from adwa_jax.route import Ahead, foot_on
 from adwa_jax.score import (
-    Normalisation,
-    ScoreWeights,
     Terms,
     clearance_term,
+    forward_term,
     heading_term,
     normalise,
+    on_route_term,
+    progress_term,
     turn_towards,
     velocity_term,
     weighted_sum,
 )
-from adwa_jax.window import RobotLimits, velocity_window
+from adwa_jax.window import velocity_window
 
 
-@jax.tree_util.register_static
-@dataclass(frozen=True)
-class DwaOptions:
-    """Static choices of a decision: how many candidates, how far ahead, how terms are made comparable."""
+class Guidance(NamedTuple):
+    """Where to."""
 
-    v_samples: int = 11  # V
-    yaw_rate_samples: int = 21  # N
-    horizon_steps: int = 20  # K
-    normalisation: Normalisation = "sum"
-
-    def __post_init__(self) -> None:
-        """Refuse windows without both their ends and empty horizons."""
-        for name, least in (("v_samples", 2), ("yaw_rate_samples", 2), ("horizon_steps", 1)):
-            require_whole(name, getattr(self, name), least)
-        require_choice("normalisation", self.normalisation, ("sum", "minmax", "none"))
-
-
-class RobotState(NamedTuple):
-    """Pose and present velocities, [] float32 each."""
-
-    x: jax.Array  # [m]
-    y: jax.Array  # [m]
-    heading: jax.Array  # [rad]
-    v: jax.Array  # [m/s]
-    yaw_rate: jax.Array  # [rad/s]
+    local_target: jax.Array  # [2] float32 (x, y) [m]
+    goal: jax.Array  # [2] float32 [m]
+    ahead: Ahead | None = None  # the route, for `rules.progress`
 
 
 class Candidates(NamedTuple):
@@ -60,7 +45,7 @@ class Candidates(NamedTuple):
 
     v: jax.Array  # [V] float32 [m/s]
     yaw_rate: jax.Array  # [N] float32 [rad/s]
-    clearance: jax.Array  # [V, N] float32 [m], least over the predicted points
+    clearance: jax.Array  # [V, N] float32 [m], least over the predicted points; to statics only under `mover_terms`
     admissible: jax.Array  # [V, N] bool
     terms: Terms  # raw terms, before normalisation
     score: jax.Array  # [V, N] float32; of no meaning where not admissible
@@ -71,37 +56,106 @@ class Decision(NamedTuple):
 
     v: jax.Array  # [] float32 [m/s]
     yaw_rate: jax.Array  # [] float32 [rad/s]
-    index: jax.Array  # [] int32, the chosen candidate; -1: none was admissible, the robot brakes
+    index: jax.Array  # [] int32, the chosen candidate; -1: none was admissible, the robot brakes or does its least bad
     candidates: Candidates
 
 
-def decide(state: RobotState, local_target: jax.Array, goal: jax.Array, field: DistanceField, sensed: Sensed,
-           weights: ScoreWeights, robot: RobotLimits, clearance_cap: Scalar, dt: Scalar,
-           options: DwaOptions) -> Decision:
+class _Judged(NamedTuple):
+    """What is known of the candidates before they are scored."""
+
+    v: jax.Array  # [V]
+    yaw_rate: jax.Array  # [N]
+    end: Pose  # [V, N]
+    clearance: jax.Array  # [V, N]
+    admissible: jax.Array  # [V, N] bool
+    prediction: Prediction | None  # None: the paper's arcs
+    badness: jax.Array | None  # [V, N], least for the least bad
+
+
+def decide(state: RobotState, guidance: Guidance, field: DistanceField, sensed: Sensed, constants: Constants,
+           options: Options) -> Decision:
     """The admissible candidate of largest score (eq. 9); ties go to the lower index.
 
     Traditional DWA (eq. 8) is the goal as `local_target` and `global_heading` 0. Without an admissible candidate the
-    robot brakes within its window and turns towards the local target.
+    robot brakes within its window and turns towards the local target, or does its least bad (`rules.least_bad`).
 
-    Unbatched. local_target, goal: [2] [m]; clearance_cap [m], dt [s]: []. No NaN for finite input.
+    Unbatched. No NaN for finite input.
     """
-    v, yaw_rate = velocity_window(state.v, state.yaw_rate, robot, dt, options.v_samples, options.yaw_rate_samples)
-    arc = arcs(state.heading, yaw_rate, dt, options.horizon_steps)
-    clearance = candidate_clearance(state, v, arc, field, sensed, dt) - robot.radius
-    admissible = is_admissible(clearance, v, yaw_rate, robot)
-    terms = _terms(state, v, arc, clearance, local_target, goal, clearance_cap)
-    scales = Terms(*map(jnp.float32, (jnp.pi, clearance_cap, robot.v_max, jnp.pi)))
-    score = weighted_sum(normalise(terms, admissible, scales, options.normalisation), weights)
-    candidates = Candidates(v, yaw_rate, clearance, admissible, terms, score)
-    best = jnp.argmax(jnp.where(admissible, score, -jnp.inf)).astype(jnp.int32)
-    brake_v, brake_yaw_rate = brake_and_turn(state, v, yaw_rate, local_target, dt)
-    moves = jnp.any(admissible)
+    robot, rules = constants.robot, options.rules
+    beyond = rules.ramp or rules.second_phase or rules.stopping or rules.long_watch or rules.mover_terms \
+        or rules.mover_margin or rules.reverse or len(robot.disc_offsets) > 1  # fmt: skip
+    judged = (_judged_beyond if beyond else _judged_as_printed)(state, field, sensed, constants, options)
+    terms = _terms(state, judged, guidance, constants, options)
+    score = weighted_sum(normalise(terms, judged.admissible, _scales(constants, options), options.dwa.normalisation),
+                         constants.weights)
+    candidates = Candidates(judged.v, judged.yaw_rate, judged.clearance, judged.admissible, terms, score)
+    best = jnp.argmax(jnp.where(judged.admissible, score, -jnp.inf)).astype(jnp.int32)
+    moves = jnp.any(judged.admissible)
+    width = judged.yaw_rate.shape[0]
+    otherwise = _otherwise(state, judged, guidance, constants, options)
     return Decision(
-        v=jnp.where(moves, v[best // options.yaw_rate_samples], brake_v),
-        yaw_rate=jnp.where(moves, yaw_rate[best % options.yaw_rate_samples], brake_yaw_rate),
+        v=jnp.where(moves, judged.v[best // width], otherwise[0]),
+        yaw_rate=jnp.where(moves, judged.yaw_rate[best % width], otherwise[1]),
         index=jnp.where(moves, best, -1),
         candidates=candidates,
     )
+
+
+def _judged_as_printed(state: RobotState, field: DistanceField, sensed: Sensed, constants: Constants,
+                       options: Options) -> _Judged:
+    """The paper's candidates: constant velocities of the window (eqs. 6 and 7), clear over the whole horizon."""
+    robot, dt, dwa = constants.robot, constants.behaviour.dt, options.dwa
+    v, yaw_rate = velocity_window(state.v, state.yaw_rate, robot, dt, dwa.v_samples, dwa.yaw_rate_samples)
+    arc = arcs(state.heading, yaw_rate, dt, dwa.horizon_steps)
+    clearance = candidate_clearance(state, v, arc, field, sensed, dt) - robot.radius
+    end = Pose(
+        x=state.x + v[:, None] * arc.reach_x[-1][None, :],
+        y=state.y + v[:, None] * arc.reach_y[-1][None, :],
+        heading=jnp.broadcast_to(arc.heading[-1][None, :], clearance.shape),
+    )
+    return _Judged(v, yaw_rate, end, clearance, is_admissible(clearance, v, yaw_rate, robot), None, None)
+
+
+def _judged_beyond(state: RobotState, field: DistanceField, sensed: Sensed, constants: Constants,
+                   options: Options) -> _Judged:
+    """Candidates as the rules make and judge them."""
+    robot, behaviour, rules, dwa = constants.robot, constants.behaviour, options.rules, options.dwa
+    profiles = candidate_profiles(state, constants, options)
+    # A robot that is nearer than its margin may go on, but not much nearer. Predictions, whose points lie farther apart,
+    # keep twice the margin, so that none promises a way on which the next steps are not admissible.
+    now = clearance_now(state, field, sensed, robot)
+    room, wider = (jnp.minimum(margin, 0.5 * now) for margin in (behaviour.static_margin, 2.0 * behaviour.static_margin))
+    found = predict(state, profiles, dwa.horizon_steps, _stride(options), field, sensed, robot, behaviour,
+                    rules.mover_margin, wider if rules.stopping else None)
+    clearance = found.static if rules.mover_terms else jnp.minimum(found.static, found.moving)
+    badness = None
+    if rules.stopping:
+        halt = halts_clear(state, profiles, field, sensed, robot, behaviour, dwa.halt_steps, rules.mover_margin,
+                           room)
+        admissible = halt.clear_of_statics & (halt.moving > 0)
+        badness = jnp.where(halt.clear_of_statics, -found.contact_time - 0.01 * jnp.clip(halt.moving, -1.0, 1.0),
+                            1e3 - halt.static)
+    else:
+        least = jnp.minimum(found.static, found.moving)
+        admissible = is_admissible(least, profiles.v, profiles.yaw_rate, robot)
+        badness = jnp.where(found.static > 0, -found.contact_time, 1e3 - found.static)
+    return _Judged(profiles.v, profiles.yaw_rate, found.end, clearance, admissible, found, badness)
+
+
+def candidate_profiles(state: RobotState, constants: Constants, options: Options) -> Profiles:
+    """What each candidate commands over the predicted time."""
+    robot, dt, rules, dwa = constants.robot, constants.behaviour.dt, options.rules, options.dwa
+    steps = dwa.watch_steps if rules.long_watch else dwa.horizon_steps
+    if rules.ramp:
+        speeds = speed_targets(robot, dwa.v_samples, rules.second_phase, rules.reverse)
+        turns = turn_targets(robot, dwa.yaw_rate_samples, rules.second_phase)
+        return two_phase_profiles(state.v, state.yaw_rate, speeds, turns, robot, dt, steps, dwa.stride, dwa.turn_step)
+    v, yaw_rate = velocity_window(state.v, state.yaw_rate, robot, dt, dwa.v_samples, dwa.yaw_rate_samples)
+    return constant_profiles(v, yaw_rate, steps)
+
+
+def _stride(options: Options) -> int:
+    return options.dwa.stride if options.rules.ramp else 1
 
 
 def candidate_clearance(state: RobotState, v: jax.Array, arc: Arcs, field: DistanceField, sensed: Sensed,
@@ -126,17 +180,6 @@ def candidate_clearance(state: RobotState, v: jax.Array, arc: Arcs, field: Dista
     return least
 
 
-def is_admissible(clearance: jax.Array, v: jax.Array, yaw_rate: jax.Array, robot: RobotLimits) -> jax.Array:
-    """[V, N] bool: clearance > 0, |v| ≤ √(2·clearance·brake) and |yaw rate| ≤ √(2·clearance·yaw_brake).
-
-    The robot can stop within the room it has; in reverse too.
-    """
-    room = 2.0 * jnp.maximum(clearance, 0.0)
-    stops = (v * v)[:, None] <= room * robot.brake
-    stops &= (yaw_rate * yaw_rate)[None, :] <= room * robot.yaw_brake
-    return (clearance > 0) & stops
-
-
 def brake_and_turn(state: RobotState, v: jax.Array, yaw_rate: jax.Array, local_target: jax.Array,
                    dt: Scalar) -> tuple[jax.Array, jax.Array]:
     """The speed nearest 0 and the yaw rate nearest to facing the target after one step, both within the window."""
@@ -149,16 +192,61 @@ def wrap(angle: jax.Array) -> jax.Array:
     return angle - 2.0 * jnp.pi * jnp.floor(angle / (2.0 * jnp.pi) + 0.5)
 
 
-def _terms(state: RobotState, v: jax.Array, arc: Arcs, clearance: jax.Array, local_target: jax.Array,
-           goal: jax.Array, clearance_cap: Scalar) -> Terms:
-    end = Pose(
-        x=state.x + v[:, None] * arc.reach_x[-1][None, :],
-        y=state.y + v[:, None] * arc.reach_y[-1][None, :],
-        heading=jnp.broadcast_to(arc.heading[-1][None, :], clearance.shape),
+def _otherwise(state: RobotState, judged: _Judged, guidance: Guidance, constants: Constants,
+               options: Options) -> tuple[jax.Array, jax.Array]:
+    """The command where no candidate is admissible."""
+    robot, dt = constants.robot, constants.behaviour.dt
+    if options.rules.least_bad and judged.badness is not None:
+        index = jnp.argmin(judged.badness)
+        return judged.v[index // judged.yaw_rate.shape[0]], judged.yaw_rate[index % judged.yaw_rate.shape[0]]
+    if not options.rules.ramp:
+        return brake_and_turn(state, judged.v, judged.yaw_rate, guidance.local_target, dt)
+    limits = (robot.acceleration * dt, robot.yaw_acceleration * dt)
+    v, yaw_rate = (jnp.stack([value - reach, value + reach])
+                   for value, reach in zip((state.v, state.yaw_rate), limits, strict=True))  # fmt: skip
+    return brake_and_turn(state, v, jnp.clip(yaw_rate, -robot.yaw_rate_max, robot.yaw_rate_max),
+                          guidance.local_target, dt)
+
+
+def _terms(state: RobotState, judged: _Judged, guidance: Guidance, constants: Constants, options: Options) -> Terms:
+    rules, behaviour, end, shape = options.rules, constants.behaviour, judged.end, judged.clearance.shape
+    # A carrot is near: seen from the end of a candidate that passes it, it would lie behind.
+    begin = Pose(state.x, state.y, end.heading) if rules.carrot else end
+    terms = Terms(
+        local_heading=heading_term(begin.x, begin.y, begin.heading, guidance.local_target),
+        clearance=clearance_term(judged.clearance, behaviour.clearance_cap),
     )
-    return Terms(
-        local_heading=heading_term(end.x, end.y, end.heading, local_target),
-        clearance=clearance_term(clearance, clearance_cap),
-        velocity=velocity_term(v, clearance.shape),
-        global_heading=heading_term(end.x, end.y, end.heading, goal),
-    )
+    if rules.progress and guidance.ahead is not None:
+        now = foot_on(guidance.ahead, state.x, state.y).along
+        foot, farthest = foot_on(guidance.ahead, end.x, end.y), _farthest(constants, options)
+        along = foot.along
+        if judged.prediction is not None:  # to be halfway there sooner is better: or the robot puts off what it can
+            along = 0.5 * (along + foot_on(guidance.ahead, *judged.prediction.middle).along)
+        terms = terms._replace(progress=progress_term(along, now, farthest),
+                               on_route=on_route_term(foot.apart, farthest))
+    else:
+        terms = terms._replace(
+            velocity=velocity_term(judged.v, shape),
+            global_heading=heading_term(end.x, end.y, end.heading, guidance.goal),
+        )
+    if rules.mover_terms and judged.prediction is not None:
+        found = judged.prediction
+        terms = terms._replace(contact_time=found.contact_time,
+                               mover_clearance=jnp.clip(found.moving, 0.0, behaviour.mover_cap))
+    if rules.reverse:
+        terms = terms._replace(forward=forward_term(judged.v, shape))
+    return terms
+
+
+def _scales(constants: Constants, options: Options) -> Terms:
+    """What a term is divided by under fixed scales: the most it can be."""
+    robot, behaviour, dwa = constants.robot, constants.behaviour, options.dwa
+    steps = dwa.watch_steps if options.rules.long_watch else dwa.horizon_steps
+    scales = (jnp.pi, behaviour.clearance_cap, robot.v_max, jnp.pi, _farthest(constants, options),
+              _farthest(constants, options), behaviour.dt * (steps * _stride(options)), behaviour.mover_cap, 1.0)  # fmt: skip
+    return Terms(*map(jnp.float32, scales))
+
+
+def _farthest(constants: Constants, options: Options) -> Scalar:
+    """What the robot can cover in the horizon [m]."""
+    return constants.robot.v_max * constants.behaviour.dt * (options.dwa.horizon_steps * _stride(options))

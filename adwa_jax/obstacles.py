@@ -32,6 +32,8 @@ class Sensed(NamedTuple):
     velocity: jax.Array  # [M, 2] float32 [m/s]
     radius: jax.Array  # [M] float32 [m]
     seen: jax.Array  # [M] bool, in range now
+    square_rounding: jax.Array  # [S] float32 [m]
+    border: jax.Array | None = None  # [2, 2] low and high corner [m] between which movers are predicted to turn back
 
 
 def movers_at(movers: Movers, time: jax.Array) -> MoverStates:
@@ -46,6 +48,13 @@ def movers_at(movers: Movers, time: jax.Array) -> MoverStates:
         velocity=jnp.where(has_track, tracked.velocity, free.velocity),
         present=movers.valid & (tracked.present | ~has_track[:, 0]),
     )
+
+
+def _turned_back(centres: jax.Array, now: jax.Array, radius: jax.Array, border: jax.Array) -> jax.Array:
+    """Centres [M, 2] mirrored once where their discs would cross the border; discs that cross it now go on."""
+    low, high = border[:1] + radius[:, None], border[1:] - radius[:, None]
+    back = jnp.where(centres < low, 2.0 * low - centres, jnp.where(centres > high, 2.0 * high - centres, centres))
+    return jnp.where((now >= low) & (now <= high), back, centres)
 
 
 def _mirrored(movers: Movers, time: jax.Array) -> MoverStates:
@@ -82,7 +91,8 @@ def sense(squares: UnknownSquares, known: jax.Array, movers: Movers, states: Mov
 
     Range is measured to the obstacle's outline. Unbatched. known: [S] bool; position: [2] [m]; sensor_range: [] [m].
     """
-    to_square = _distance_to_square(position[0], position[1], squares.centre.T, squares.half_width)
+    to_square = _distance_to_square(position[0], position[1], squares.centre.T, squares.half_width,
+                                    squares.rounding)
     offset = states.position - position[None, :]
     to_mover = jnp.sqrt(jnp.sum(offset * offset, axis=1)) - movers.radius
     return Sensed(
@@ -93,14 +103,19 @@ def sense(squares: UnknownSquares, known: jax.Array, movers: Movers, states: Mov
         velocity=states.velocity,
         radius=movers.radius,
         seen=states.present & (to_mover <= sensor_range),
+        square_rounding=squares.rounding,
     )
 
 
 def clearance_to_squares(sensed: Sensed, x: jax.Array, y: jax.Array) -> jax.Array:
-    """Least distance [m] from points to known squares, `NOWHERE` without any. x, y: any equal shapes."""
+    """Least distance [m] from points to known squares, `NOWHERE` without any. x, y: any equal shapes.
+
+    Within a rounded square it is negative, down to -rounding; within a sharp one 0.
+    """
 
     def distance(index: jax.Array | int) -> jax.Array:
-        apart = _distance_to_square(x, y, sensed.square_centre[index], sensed.square_half_width[index])
+        apart = _distance_to_square(x, y, sensed.square_centre[index], sensed.square_half_width[index],
+                                    sensed.square_rounding[index])
         return jnp.where(sensed.square_known[index], apart, NOWHERE)
 
     return _least(distance, sensed.square_known.shape[0], jnp.full_like(x, NOWHERE))
@@ -109,11 +124,15 @@ def clearance_to_squares(sensed: Sensed, x: jax.Array, y: jax.Array) -> jax.Arra
 def clearance_to_movers(sensed: Sensed, x: jax.Array, y: jax.Array, ahead: jax.Array) -> jax.Array:
     """Least distance [m] from points to seen movers `ahead` [s] from now, each going on at constant velocity (§4 D b).
 
-    Negative inside a mover; `NOWHERE` without any. x, y: any equal shapes; ahead: [].
+    With a border, as if mirrored there. Negative inside a mover; `NOWHERE` without any. x, y: any equal shapes;
+    ahead: [].
     """
+    centres = sensed.position + sensed.velocity * ahead
+    if sensed.border is not None:
+        centres = _turned_back(centres, sensed.position, sensed.radius, sensed.border)
 
     def distance(index: jax.Array | int) -> jax.Array:
-        centre = sensed.position[index] + sensed.velocity[index] * ahead
+        centre = centres[index]
         apart = _norm(x - centre[0], y - centre[1]) - sensed.radius[index]
         return jnp.where(sensed.seen[index], apart, NOWHERE)
 
@@ -128,10 +147,11 @@ def _least(distance: Callable[[jax.Array | int], jax.Array], count: int, start: 
     return lax.fori_loop(0, count, lambda index, least: jnp.minimum(least, distance(index)), start)
 
 
-def _distance_to_square(x: jax.Array, y: jax.Array, centre: jax.Array, half_width: jax.Array) -> jax.Array:
+def _distance_to_square(x: jax.Array, y: jax.Array, centre: jax.Array, half_width: jax.Array,
+                        rounding: jax.Array) -> jax.Array:
     dx = jnp.maximum(jnp.abs(x - centre[0]) - half_width, 0.0)
     dy = jnp.maximum(jnp.abs(y - centre[1]) - half_width, 0.0)
-    return _norm(dx, dy)
+    return _norm(dx, dy) - rounding
 
 
 def _norm(dx: jax.Array, dy: jax.Array) -> jax.Array:

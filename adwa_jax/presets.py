@@ -4,12 +4,16 @@ The text gives the thresholds 1.5 and 0.5 of eq. 5, the weights' step of 0.1 and
 other numbers are ours, each beside its reason.
 """
 
+from dataclasses import replace
+from math import ceil
 from typing import NamedTuple
 
 from adwa_jax.astar import SearchOptions
-from adwa_jax.constants import Behaviour, Constants, Options, PlanOptions
-from adwa_jax.dwa import DwaOptions
+from adwa_jax.constants import Behaviour, Constants, DwaOptions, Options, PlanOptions
+from adwa_jax.constants import DwaOptions
+from adwa_jax.footprint import covering_discs
 from adwa_jax.heuristic_weight import WeightRule
+from adwa_jax.rules import EVERY_RULE, Rules
 from adwa_jax.score import ScoreWeights
 from adwa_jax.window import RobotLimits
 
@@ -58,4 +62,73 @@ def paper() -> Preset:
     )
 
 
-PRESETS = {"paper": paper}
+def preset(rules: Rules) -> Preset:
+    """The paper's planner with some rules beyond it; a rule that is off leaves the paper's constants in force.
+
+    Constants of rules that are on were found on scenarios of other seeds than any figure we report.
+    """
+    base = paper()
+    constants, options = base.constants, base.options
+    weights, behaviour, robot, dwa = constants.weights, constants.behaviour, constants.robot, options.dwa
+    if rules.ramp:
+        dwa = replace(dwa, v_samples=6, yaw_rate_samples=9, horizon_steps=8, stride=2, turn_step=2, watch_steps=8)
+    if rules.long_watch:
+        dwa = replace(dwa, watch_steps=12 if rules.ramp else 30)
+    if rules.fixed_scale:
+        dwa = replace(dwa, normalisation="none")
+    if rules.reverse:
+        robot = replace(robot, v_min=-0.4)
+        weights = replace(weights, forward=0.1)
+    if rules.stopping:
+        behaviour = replace(behaviour, static_margin=0.02)
+    if rules.progress:
+        weights = replace(weights, local_heading=0.2, clearance=0.1, progress=2.0, on_route=0.5)
+    if rules.mover_terms:
+        weights = replace(weights, contact_time=1.5, mover_clearance=0.3)
+    if rules.mover_margin:
+        behaviour = replace(behaviour, mover_margin=0.08, mover_growth=0.03)
+    if rules.replan:
+        behaviour = replace(behaviour, clearance_margin=0.35, route_margin=0.05)
+    plan = replace(options.plan, subdivision=10) if rules.fine_field else options.plan
+    return Preset(
+        constants=replace(constants, weights=weights, robot=robot, behaviour=behaviour),
+        options=replace(options, plan=plan, dwa=dwa, rules=rules),
+    )
+
+
+def on_robot(config: Preset, robot: RobotLimits) -> Preset:
+    """The same planner on another robot: what follows from its size and speed is set anew.
+
+    Reverse is as the robot says; without `rules.reverse` it stands still at the slowest.
+    """
+    constants, options = config.constants, config.options
+    behaviour, rules, dwa = constants.behaviour, options.rules, options.dwa
+    keeps = behaviour.clearance_margin - constants.robot.radius  # what key-point segments keep beyond the outline
+    lookahead = behaviour.lookahead * min(max(robot.v_max / constants.robot.v_max, 0.5), 2.0)
+    halt = max(robot.v_max / robot.acceleration, robot.yaw_rate_max / robot.yaw_acceleration) / behaviour.dt
+    return Preset(
+        constants=replace(
+            constants,
+            robot=robot if rules.reverse else replace(robot, v_min=max(robot.v_min, 0.0)),
+            behaviour=replace(behaviour, clearance_margin=robot.radius + keeps, lookahead=lookahead),
+        ),
+        options=replace(options, dwa=replace(dwa, halt_steps=ceil(halt - 1e-6) + 1)),
+    )
+
+
+def jackal(v_max: float = 2.0) -> RobotLimits:
+    """Clearpath's Jackal, the robot of the BARN benchmark: 0.42 × 0.33 m, covered by two discs of radius 0.196 m."""
+    radius, offsets = covering_discs(length=0.42, width=0.33, count=2)
+    return RobotLimits(
+        radius=radius, disc_offsets=offsets, v_min=-0.3, v_max=v_max, yaw_rate_max=1.57,
+        acceleration=4.0, yaw_acceleration=8.0, brake=4.0, yaw_brake=8.0,
+    )  # fmt: skip
+
+
+def extended() -> Preset:
+    """Every rule beyond the paper."""
+    return preset(EVERY_RULE)
+
+
+ROBOTS = {"disc": lambda: extended().constants.robot, "jackal": jackal}
+PRESETS = {"paper": paper, "extended": extended}

@@ -16,6 +16,16 @@ class Pose(NamedTuple):
     heading: jax.Array  # [rad]
 
 
+class RobotState(NamedTuple):
+    """Pose and present velocities, [] float32 each."""
+
+    x: jax.Array  # [m]
+    y: jax.Array  # [m]
+    heading: jax.Array  # [rad]
+    v: jax.Array  # [m/s]
+    yaw_rate: jax.Array  # [rad/s]
+
+
 class Arcs(NamedTuple):
     """The predicted points of all candidates; those of one yaw rate lie on rays: x = x₀ + v · reach_x."""
 
@@ -56,3 +66,23 @@ def rollout(pose: Pose, v: jax.Array, yaw_rate: jax.Array, dt: Scalar, steps: in
         y=pose.y + v[None, :, None] * arc.reach_y[:, None, :],
         heading=jnp.broadcast_to(arc.heading[:, None, :], shape),
     )
+
+
+class Points(NamedTuple):
+    """Predicted poses one step after another; headings are shared by all speeds."""
+
+    move_x: jax.Array  # [K, N] float32, x covered in the step at 1 m/s [s]
+    move_y: jax.Array  # [K, N] float32
+    cosine: jax.Array  # [K, N] float32, of the heading after the step
+    sine: jax.Array  # [K, N] float32
+
+
+def points(heading: jax.Array, yaw_rate_ahead: jax.Array, dt: Scalar, stride: int = 1) -> Points:
+    """Headings over K predicted steps of `stride` control steps each, for N yaw-rate profiles [K, N] [rad/s].
+
+    A step stands for `stride` Euler steps (eq. 7) along their mean heading; with stride 1 it is one. Unbatched.
+    """
+    turned = jnp.cumsum(yaw_rate_ahead * (stride * dt), axis=0)
+    after = heading + turned
+    along = after - yaw_rate_ahead * (dt * ((stride + 1) / 2))
+    return Points(jnp.cos(along) * (stride * dt), jnp.sin(along) * (stride * dt), jnp.cos(after), jnp.sin(after))

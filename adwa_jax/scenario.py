@@ -1,6 +1,6 @@
 """The world of one episode: the known map, the task, and what the robot does not know beforehand (§4 D).
 
-Dimension letters: S unknown squares, M movers, J track points of a mover.
+Dimension letters: H, W map; S unknown squares; M movers; J track points of a mover.
 """
 
 from dataclasses import dataclass
@@ -11,13 +11,15 @@ import jax
 from adwa_jax.grid import Grid
 
 
-@partial(jax.tree_util.register_dataclass, data_fields=["centre", "half_width", "valid"], meta_fields=[])
+@partial(jax.tree_util.register_dataclass, data_fields=["centre", "half_width", "rounding", "valid"],
+         meta_fields=[])
 @dataclass(frozen=True)
 class UnknownSquares:
-    """Static obstacles that are not on the map: axis-aligned squares."""
+    """Static obstacles that are not on the map: axis-aligned squares, sharp or rounded, and discs."""
 
     centre: jax.Array  # [S, 2] float32, x, y [m]
     half_width: jax.Array  # [S] float32 [m]
+    rounding: jax.Array  # [S] float32 [m]: the square grown by a disc of this radius; half_width 0 and r is a disc
     valid: jax.Array  # [S] bool; False is padding
 
 
@@ -45,14 +47,15 @@ class Movers:
 
 
 @partial(jax.tree_util.register_dataclass,
-         data_fields=["grid", "start", "heading_given", "goal", "goal_tolerance", "time_limit", "reference_length",
-                      "squares", "movers"],
+         data_fields=["grid", "hidden", "start", "heading_given", "goal", "goal_tolerance", "time_limit",
+                      "reference_length", "squares", "movers"],
          meta_fields=[])
 @dataclass(frozen=True)
 class Scenario:
     """One episode's world and task. Unbatched; `vmap` adds a leading axis."""
 
     grid: Grid  # what the robot knows beforehand
+    hidden: jax.Array  # [H, W] bool: occupied cells not on the robot's map until in its range; [0, 0] without any
     start: jax.Array  # [3] float32, x [m], y [m], heading [rad]
     heading_given: jax.Array  # [] bool; False: the robot starts facing its first key point
     goal: jax.Array  # [2] float32, x, y [m]

@@ -18,7 +18,8 @@ Normalisation = Literal["sum", "minmax", "none"]
 
 @partial(
     jax.tree_util.register_dataclass,
-    data_fields=["local_heading", "clearance", "velocity", "global_heading"],
+    data_fields=["local_heading", "clearance", "velocity", "global_heading", "progress", "on_route", "contact_time",
+                 "mover_clearance", "forward"],
     meta_fields=[],
 )
 @dataclass(frozen=True)
@@ -29,6 +30,12 @@ class ScoreWeights:
     clearance: Scalar  # β
     velocity: Scalar  # γ
     global_heading: Scalar  # δ
+    # Of the rules beyond the paper.
+    progress: Scalar = 0.0
+    on_route: Scalar = 0.0
+    contact_time: Scalar = 0.0
+    mover_clearance: Scalar = 0.0
+    forward: Scalar = 0.0
 
     def __post_init__(self) -> None:
         """Refuse negative and non-finite weights; traced values pass unseen."""
@@ -36,12 +43,17 @@ class ScoreWeights:
 
 
 class Terms(NamedTuple):
-    """One value a candidate and term."""
+    """One value a candidate and term, ≥ 0 but for the velocity of a robot in reverse; None: a term not in use."""
 
     local_heading: jax.Array  # [V, N]
     clearance: jax.Array  # [V, N]
-    velocity: jax.Array  # [V, N]
-    global_heading: jax.Array  # [V, N]
+    velocity: jax.Array | None = None  # [V, N]
+    global_heading: jax.Array | None = None  # [V, N]
+    progress: jax.Array | None = None  # [V, N]
+    on_route: jax.Array | None = None  # [V, N]
+    contact_time: jax.Array | None = None  # [V, N]
+    mover_clearance: jax.Array | None = None  # [V, N]
+    forward: jax.Array | None = None  # [V, N]
 
 
 def heading_term(x: jax.Array, y: jax.Array, heading: jax.Array, target: jax.Array) -> jax.Array:
@@ -74,26 +86,44 @@ def velocity_term(v: jax.Array, shape: tuple[int, ...]) -> jax.Array:
     return jnp.broadcast_to(v[:, None], shape)
 
 
+def progress_term(along: jax.Array, now: jax.Array, farthest: Scalar) -> jax.Array:
+    """How much farther along the route the candidate ends than the robot is [m], plus `farthest`, which no candidate
+    exceeds in either direction: in [0, 2 · farthest].
+    """
+    return jnp.clip(along - now + farthest, 0.0, 2.0 * farthest)
+
+
+def on_route_term(squared: jax.Array, farthest: Scalar) -> jax.Array:
+    """How much nearer than `farthest` [m] to the route the candidate ends, ≥ 0; squared: its distance² [m²]."""
+    positive = squared > 0
+    apart = jnp.where(positive, jnp.sqrt(jnp.where(positive, squared, 1.0)), 0.0)
+    return jnp.maximum(farthest - apart, 0.0)
+
+
+def forward_term(v: jax.Array, shape: tuple[int, ...]) -> jax.Array:
+    """1 for candidates that go forward or stand, 0 for those in reverse. v: [V]; shape (V, N)."""
+    return jnp.broadcast_to((v >= 0).astype(jnp.float32)[:, None], shape)
+
+
 def normalise(terms: Terms, admissible: jax.Array, scales: Terms, normalisation: Normalisation) -> Terms:
     """Each term over its sum over the admissible candidates (`sum`), its range there (`minmax`) or a fixed scale.
 
     A term whose sum or range is 0 says nothing and becomes 0. admissible: [V, N] bool; scales: [] each, for `none`.
     """
     if normalisation == "none":
-        return Terms(*(term / scale for term, scale in zip(terms, scales, strict=True)))
-    if normalisation == "minmax":
-        return Terms(*(_over_range(term, admissible) for term in terms))
-    return Terms(*(_over_sum(term, admissible) for term in terms))
+        return Terms(*(None if term is None else term / scale for term, scale in zip(terms, scales, strict=True)))
+    over = _over_range if normalisation == "minmax" else _over_sum
+    return Terms(*(None if term is None else over(term, admissible) for term in terms))
 
 
 def weighted_sum(terms: Terms, weights: ScoreWeights) -> jax.Array:
-    """G = α·LHeading + β·Dist + γ·Vel + δ·GHeading (eq. 9), [V, N]."""
-    return (
-        weights.local_heading * terms.local_heading
-        + weights.clearance * terms.clearance
-        + weights.velocity * terms.velocity
-        + weights.global_heading * terms.global_heading
-    )
+    """G = α·LHeading + β·Dist + γ·Vel + δ·GHeading (eq. 9) and so on for the terms in use, [V, N]."""
+    total = weights.local_heading * terms.local_heading
+    for name in Terms._fields[1:]:
+        term = getattr(terms, name)
+        if term is not None:
+            total = total + getattr(weights, name) * term
+    return total
 
 
 def _over_sum(term: jax.Array, admissible: jax.Array) -> jax.Array:

@@ -12,14 +12,15 @@ from adwa_jax.grid import Scalar
 
 @partial(
     jax.tree_util.register_dataclass,
-    data_fields=["radius", "v_min", "v_max", "yaw_rate_max", "acceleration", "yaw_acceleration", "brake", "yaw_brake"],
+    data_fields=["radius", "v_min", "v_max", "yaw_rate_max", "acceleration", "yaw_acceleration", "brake", "yaw_brake",
+                 "disc_offsets"],
     meta_fields=[],
 )
 @dataclass(frozen=True)
 class RobotLimits:
-    """A disc robot's size and limits. Traced."""
+    """A robot's size and limits: one disc, or several along its x axis that cover it (`footprint`). Traced."""
 
-    radius: Scalar  # [m]
+    radius: Scalar  # of each disc [m]
     v_min: Scalar  # [m/s]; negative: may reverse
     v_max: Scalar  # [m/s]
     yaw_rate_max: Scalar  # [rad/s], both ways
@@ -27,6 +28,7 @@ class RobotLimits:
     yaw_acceleration: Scalar  # [rad/s²]
     brake: Scalar  # [m/s²], what admissibility counts on
     yaw_brake: Scalar  # [rad/s²]
+    disc_offsets: tuple[Scalar, ...] = (0.0,)  # of the discs' centres, ahead of the robot's centre [m]; D of them
 
     def __post_init__(self) -> None:
         """Refuse limits no robot can have; traced values pass unseen."""

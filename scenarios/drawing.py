@@ -31,6 +31,9 @@ CELL_LINES = "#DDDDDD"
 FONT = 9  # [pt]
 MOST_CELL_LINES = 40  # cells a side up to which each cell is outlined
 TRACK_STEP = 0.1  # [s] between the points of a mover's track
+FASTEST = 20.0  # [m/s]; what covers more between two points of its track was not moved but put there
+UNKNOWN_STYLE: dict[str, Any] = {"facecolor": ORANGE, "edgecolor": BLACK, "hatch": "////"}
+"""How that is drawn which is not on the robot's map."""
 
 
 def draw_map(grid: Grid, ax: "Axes | None" = None, y_down: bool = False) -> "Axes":
@@ -58,11 +61,12 @@ def draw_map(grid: Grid, ax: "Axes | None" = None, y_down: bool = False) -> "Axe
 
 def draw_scenario(scenario: Scenario, ax: "Axes | None" = None, y_down: bool = False, seconds: float = 10.0,
                   legend: bool = True) -> "Axes":
-    """Map, start, goal, unknown squares, and movers at t = 0 with their way over the next `seconds` [s].
+    """Map, hidden cells, start, goal, unknown squares, and movers at t = 0 with their way over the next `seconds` [s].
 
     Movers are drawn to scale, as discs; an arrowhead ends each one's way. Unbatched; padding is not drawn.
     """
     ax = draw_map(scenario.grid, ax, y_down)
+    draw_hidden(scenario.grid, scenario.hidden, ax)
     draw_ends(scenario.start[:2], scenario.goal, ax)
     draw_squares(scenario.squares, ax)
     ways = mover_ways(scenario.movers, seconds)
@@ -74,11 +78,11 @@ def draw_scenario(scenario: Scenario, ax: "Axes | None" = None, y_down: bool = F
 
 
 def contact_sheet(suite: Suite | Sequence[Scenario], names: Sequence[str] | None = None, path: Path | None = None,
-                  limit: int = 24) -> "Figure":
+                  limit: int = 24, y_down: bool = False) -> "Figure":
     """The first `limit` scenarios side by side, each with its name and the size of its map; saved if `path` is given.
 
-    names: one a scenario; those of the suite, or numbers from 0, unless given. Raises InputError where there is nothing
-    to draw.
+    names: one a scenario; those of the suite, or numbers from 0, unless given. y_down: of the maps (`draw_map`).
+    Raises InputError where there is nothing to draw.
     """
     scenarios = suite.scenarios if isinstance(suite, Suite) else tuple(suite)
     shown = scenarios[:limit]
@@ -91,7 +95,7 @@ def contact_sheet(suite: Suite | Sequence[Scenario], names: Sequence[str] | None
     figure = new_figure((1.75 * columns + 0.3, 2.05 * rows + 0.9))
     tiles = figure.subplots(rows, columns, squeeze=False).ravel()
     for tile, scenario, name in zip(tiles, shown, names, strict=False):
-        _draw_tile(scenario, name, tile)
+        _draw_tile(scenario, name, tile, y_down)
     for tile in tiles[len(shown) :]:
         tile.set_axis_off()
     heading = suite.name if isinstance(suite, Suite) else "Scenarios"
@@ -102,17 +106,45 @@ def contact_sheet(suite: Suite | Sequence[Scenario], names: Sequence[str] | None
     return figure
 
 
-def draw_squares(squares: UnknownSquares, ax: "Axes") -> list[Any]:
-    """The unknown squares as hatched squares, to scale; returns their patches, in order, padding left out."""
-    from matplotlib.patches import Rectangle
+def draw_hidden(grid: Grid, hidden: ArrayLike, ax: "Axes") -> list[Any]:
+    """The hidden cells [H, W] (or [0, 0]) as hatched cells, to scale; returns their collection, if there are any."""
+    from matplotlib.collections import PolyCollection
 
+    rows, columns = np.nonzero(np.asarray(hidden)[: int(grid.height), : int(grid.width)])
+    if not rows.size:
+        return []
+    corners = np.array([(0, 0), (1, 0), (1, 1), (0, 1)])
+    cells = np.stack([columns, rows], axis=1)[:, None, :] + corners
+    outlines = np.asarray(grid.origin) + cells * float(grid.resolution)
+    drawn = PolyCollection(list(outlines), label="hidden cell", linewidth=0.3, zorder=1.5, **UNKNOWN_STYLE)
+    return [ax.add_collection(drawn, autolim=False)]
+
+
+def draw_squares(squares: UnknownSquares, ax: "Axes") -> list[Any]:
+    """The unknown squares and discs, hatched, to scale; returns their patches, in order, padding left out."""
+    outlines = zip(*map(np.asarray, (squares.centre, squares.half_width, squares.rounding)), strict=True)
     patches = []
-    for centre, half, valid in zip(*map(np.asarray, (squares.centre, squares.half_width, squares.valid)), strict=True):
+    for (centre, half, rounding), valid in zip(outlines, np.asarray(squares.valid), strict=True):
         if valid:
-            patch = Rectangle(tuple(centre - half), 2 * half, 2 * half, facecolor=ORANGE, edgecolor=BLACK, hatch="////",
-                              linewidth=0.8, zorder=3, label=_once("unknown square", patches))
+            patch = _unknown_patch(centre, float(half), float(rounding))
+            label = "unknown square" if half > 0 else "unknown disc"
+            patch.set(label=_once(label, [drawn for drawn in patches if drawn.get_label() == label]))
             patches.append(ax.add_patch(patch))
     return patches
+
+
+def _unknown_patch(centre: np.ndarray, half: float, rounding: float) -> Any:
+    """A disc, a square, or one with rounded corners."""
+    from matplotlib.patches import Circle, FancyBboxPatch, Rectangle
+
+    style = {"linewidth": 0.8, "zorder": 3} | UNKNOWN_STYLE
+    if half <= 0:
+        return Circle(tuple(centre), rounding, **style)
+    corner = tuple(centre - half)
+    if rounding <= 0:
+        return Rectangle(corner, 2 * half, 2 * half, **style)
+    return FancyBboxPatch(corner, 2 * half, 2 * half, boxstyle=f"round,pad={rounding},rounding_size={rounding}",
+                          **style)
 
 
 def draw_movers(position: np.ndarray, radius: np.ndarray, ax: "Axes", label: str = "mover", **style: Any) -> list[Any]:
@@ -148,12 +180,17 @@ def draw_ends(start: ArrayLike, goal: ArrayLike, ax: "Axes") -> None:
 
 
 def mover_ways(movers: Movers, seconds: float) -> np.ndarray:
-    """[T, M, 2] float32: where the movers are every `TRACK_STEP` from 0 to `seconds`; NaN while one is absent."""
+    """[T, M, 2] float32: where the movers are every `TRACK_STEP` from 0 to `seconds`.
+
+    NaN while one is absent, and right before one is elsewhere at once, as where a track repeats that is not closed.
+    """
     times = np.arange(0.0, seconds + TRACK_STEP / 2, TRACK_STEP).astype(np.float32)
     if np.shape(movers.valid) == (0,):
         return np.zeros((len(times), 0, 2), np.float32)
     states = _movers_at_all(movers, jax.device_put(times))
-    return np.where(np.asarray(states.present)[..., None], np.asarray(states.position), np.float32(np.nan))
+    position, drawn = np.asarray(states.position), np.asarray(states.present).copy()
+    drawn[:-1] &= np.linalg.norm(np.diff(position, axis=0), axis=2) < FASTEST * TRACK_STEP
+    return np.where(drawn[..., None], position, np.float32(np.nan))
 
 
 def extent(grid: Grid) -> tuple[float, float, float, float]:
@@ -207,8 +244,8 @@ def _movers_at_all(movers: Movers, times: jax.Array) -> MoverStates:
     return jax.vmap(movers_at, in_axes=(None, 0))(movers, times)
 
 
-def _draw_tile(scenario: Scenario, name: str, ax: "Axes") -> None:
-    draw_scenario(scenario, ax, legend=False)
+def _draw_tile(scenario: Scenario, name: str, ax: "Axes", y_down: bool) -> None:
+    draw_scenario(scenario, ax, y_down, legend=False)
     left, right, bottom, top = extent(scenario.grid)
     ax.set(xticks=[], yticks=[], xlabel="", ylabel="")
     ax.set_title(f"{name}\n{right - left:.3g} m × {top - bottom:.3g} m", fontsize=FONT - 2)

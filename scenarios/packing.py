@@ -1,8 +1,9 @@
 """Scenarios of unequal size as a handful of flat arrays, and back, bit for bit.
 
 For each field: one array with the values of all scenarios end to end, and beside it, under the name with `.shape`, the
-shape of each [N, dimensions]. Grids are stored once however many scenarios share them; `grid` [N] int32 says which.
-Dimension letters: N scenarios or grids; H, W map; S unknown squares; M movers; J track points.
+shape of each [N, dimensions]. Maps, known and hidden cells, are stored once however many scenarios share them; `grid`
+[N] int32 says which.
+Dimension letters: N scenarios or maps; H, W map; h, w hidden cells; S unknown squares; M movers; J track points.
 """
 
 import math
@@ -18,16 +19,18 @@ from adwa_jax.scenario import Movers, Scenario, UnknownSquares
 Fields = Mapping[str, tuple[type, tuple[str | int, ...]]]
 """Name of a field: its dtype and its shape, letters standing for sizes that may differ between scenarios."""
 
-GRID_FIELDS: Fields = {
-    "occupied": (np.bool_, ("H", "W")),
-    "height": (np.int32, ()),
-    "width": (np.int32, ()),
-    "resolution": (np.float32, ()),
-    "origin": (np.float32, (2,)),
+MAP_FIELDS: Fields = {
+    "grid.occupied": (np.bool_, ("H", "W")),
+    "grid.height": (np.int32, ()),
+    "grid.width": (np.int32, ()),
+    "grid.resolution": (np.float32, ()),
+    "grid.origin": (np.float32, (2,)),
+    "hidden": (np.bool_, ("h", "w")),
 }
 SQUARES_FIELDS: Fields = {
     "squares.centre": (np.float32, ("S", 2)),
     "squares.half_width": (np.float32, ("S",)),
+    "squares.rounding": (np.float32, ("S",)),
     "squares.valid": (np.bool_, ("S",)),
 }
 MOVERS_FIELDS: Fields = {
@@ -57,10 +60,11 @@ def packed(scenarios: Sequence[Scenario]) -> dict[str, np.ndarray]:
 
     Raises ValueError for a leaf that has not the documented dtype or number of dimensions.
     """
-    grids = list({id(scenario.grid): scenario.grid for scenario in scenarios}.values())
-    number = {id(grid): index for index, grid in enumerate(grids)}
-    index = np.array([number[id(scenario.grid)] for scenario in scenarios], np.int32)
-    return {"grid": index, **_flat("grid.", GRID_FIELDS, grids), **_flat("", SCENARIO_FIELDS, scenarios)}
+    first_with = {map_of(scenario): scenario for scenario in reversed(scenarios)}
+    maps = list(reversed(first_with.values()))
+    number = {map_of(scenario): index for index, scenario in enumerate(maps)}
+    index = np.array([number[map_of(scenario)] for scenario in scenarios], np.int32)
+    return {"grid": index, **_flat(MAP_FIELDS, maps), **_flat(SCENARIO_FIELDS, scenarios)}
 
 
 def unpacked(arrays: Mapping[str, np.ndarray], count: int) -> list[Scenario]:
@@ -72,35 +76,48 @@ def unpacked(arrays: Mapping[str, np.ndarray], count: int) -> list[Scenario]:
     total = len(_array(arrays, "grid.height.shape", np.int64, 2))
     if len(index) != count or (count and not 0 <= index.min() <= index.max() < total):
         raise ValueError(f"array 'grid' does not give one of the {total} grids to each of {count} scenarios")
-    grids = [Grid(*leaves) for leaves in _rows(arrays, "grid.", GRID_FIELDS, total)]
-    rows = _rows(arrays, "", SCENARIO_FIELDS, count)
-    return [_scenario(grids[grid], row) for grid, row in zip(index.tolist(), rows, strict=True)]
+    maps = [_map(leaves) for leaves in _rows(arrays, MAP_FIELDS, total)]
+    rows = _rows(arrays, SCENARIO_FIELDS, count)
+    return [_scenario(*maps[place], leaves=row) for place, row in zip(index.tolist(), rows, strict=True)]
 
 
-def _scenario(grid: Grid, leaves: tuple[Any, ...]) -> Scenario:
+def map_of(scenario: Scenario) -> tuple[int, int]:
+    """What scenarios of one map have in common; all that hide nothing hide the same."""
+    return id(scenario.grid), id(scenario.hidden) if np.size(scenario.hidden) else 0
+
+
+def _map(leaves: tuple[Any, ...]) -> tuple[Grid, Any]:
+    """Grid and hidden cells of leaves in the order of `MAP_FIELDS`."""
+    *grid, hidden = leaves
+    if hidden.shape not in ((0, 0), grid[0].shape):
+        raise ValueError("array 'hidden.shape' holds sizes other than those of the map and 0, 0")
+    return Grid(*grid), hidden
+
+
+def _scenario(grid: Grid, hidden: Any, leaves: tuple[Any, ...]) -> Scenario:
     """The scenario of leaves in the order of `SCENARIO_FIELDS`, which is that of the classes' fields."""
     task, rest = leaves[: len(TASK_FIELDS)], leaves[len(TASK_FIELDS) :]
     parts: list[Any] = [*task, UnknownSquares(*rest[: len(SQUARES_FIELDS)]), Movers(*rest[len(SQUARES_FIELDS) :])]
-    return Scenario(grid, *parts)
+    return Scenario(grid, hidden, *parts)
 
 
-def _flat(prefix: str, fields: Fields, holders: Sequence[object]) -> dict[str, np.ndarray]:
-    """The arrays of the fields of all holders, scenarios or grids."""
+def _flat(fields: Fields, holders: Sequence[Scenario]) -> dict[str, np.ndarray]:
+    """The arrays of the fields of all holders."""
     arrays = {}
     for name, (dtype, dims) in fields.items():
         leaves = [np.asarray(leaf) for leaf in map(attrgetter(name), holders)]
         if any(leaf.dtype != dtype or leaf.ndim != len(dims) for leaf in leaves):
-            raise ValueError(f"{prefix}{name}: a leaf is not {np.dtype(dtype)} with shape {dims}")
-        arrays[prefix + name] = np.concatenate([leaf.ravel() for leaf in leaves] or [np.zeros(0, dtype)])
+            raise ValueError(f"{name}: a leaf is not {np.dtype(dtype)} with shape {dims}")
+        arrays[name] = np.concatenate([leaf.ravel() for leaf in leaves] or [np.zeros(0, dtype)])
         shapes = np.array([leaf.shape for leaf in leaves], np.int64)
-        arrays[f"{prefix}{name}.shape"] = shapes.reshape(len(leaves), len(dims))
+        arrays[f"{name}.shape"] = shapes.reshape(len(leaves), len(dims))
     return arrays
 
 
-def _rows(arrays: Mapping[str, np.ndarray], prefix: str, fields: Fields, count: int) -> list[tuple[Any, ...]]:
+def _rows(arrays: Mapping[str, np.ndarray], fields: Fields, count: int) -> list[tuple[Any, ...]]:
     """For each of `count` holders the leaves of its fields, in the order of `fields`."""
     sizes: dict[str, np.ndarray] = {}
-    columns = [_leaves(arrays, prefix + name, dtype, dims, count, sizes) for name, (dtype, dims) in fields.items()]
+    columns = [_leaves(arrays, name, dtype, dims, count, sizes) for name, (dtype, dims) in fields.items()]
     return list(zip(*columns, strict=True))
 
 

@@ -1,7 +1,8 @@
 """Scenarios of unequal size in one batch, without changing any answer.
 
 Sizes are rounded up to ladders, so that few shapes are compiled; a scenario's padded shape depends on that scenario
-alone, never on its neighbours. Added cells are occupied, added squares and movers invalid; `height` and `width` stay.
+alone, never on its neighbours. Added cells are occupied and not hidden, added squares and movers invalid; `height` and
+`width` stay.
 Dimension letters: H, W map; S unknown squares; M movers; J track points; B scenarios in a batch.
 """
 
@@ -24,6 +25,7 @@ class PaddedShape:
     squares: int  # S
     movers: int  # M
     track_points: int  # J
+    hidden: bool = False  # whether `Scenario.hidden` is [H, W]; otherwise it is [0, 0]
 
 
 def padded_shape(scenario: Scenario) -> PaddedShape:
@@ -40,6 +42,7 @@ def padded_shape(scenario: Scenario) -> PaddedShape:
         squares=_rung(len(scenario.squares.valid), least=8, factor=2),
         movers=_rung(movers, least=8, factor=2),
         track_points=_rung(points, least=16, factor=4),
+        hidden=np.size(scenario.hidden) > 0,
     )
 
 
@@ -51,6 +54,7 @@ def pad(scenario: Scenario, shape: PaddedShape) -> Scenario:
     return replace(
         scenario,
         grid=pad_grid(scenario.grid, shape.rows, shape.columns),
+        hidden=_filled(scenario.hidden, (shape.rows, shape.columns) if shape.hidden else (0, 0), False),
         squares=_pad_squares(scenario.squares, shape.squares),
         movers=_pad_movers(scenario.movers, shape.movers, shape.track_points),
     )
@@ -74,6 +78,7 @@ def _pad_squares(squares: UnknownSquares, count: int) -> UnknownSquares:
     return UnknownSquares(
         centre=_filled(squares.centre, (count, 2), 0.0),
         half_width=_filled(squares.half_width, (count,), 0.0),
+        rounding=_filled(squares.rounding, (count,), 0.0),
         valid=_filled(squares.valid, (count,), False),
     )
 

@@ -18,7 +18,7 @@ from adwa_jax.plan import Plan, plan
 from adwa_jax.presets import Preset
 from adwa_jax.scenario import Scenario
 from adwa_jax.score import ScoreWeights
-from adwa_jax.simulate import Episode, drive
+from adwa_jax.simulate import Episode, drive_lanes
 from scenarios.padding import PaddedShape, pad, padded_shape, stack
 from scenarios.suite import Suite
 from tuning.results import Results
@@ -102,8 +102,7 @@ def _episodes(lanes: Scenario, constants: Constants, options: Options) -> tuple[
         return plan(scenario.grid, scenario.start[:2], scenario.goal, constants, options.plan)
 
     plans = jax.lax.map(plan_one, lanes)
-    episodes = jax.vmap(lambda scenario, planned: drive(scenario, planned, constants, options))(lanes, plans)
-    return planned_columns(plans), episodes
+    return planned_columns(plans), drive_lanes(lanes, plans, constants, options)
 
 
 def planned_columns(planned: Plan) -> dict[str, jax.Array]:
@@ -121,7 +120,7 @@ def planned_columns(planned: Plan) -> dict[str, jax.Array]:
 def _columns(planned: dict[str, jax.Array], episodes: Episode) -> dict[str, np.ndarray]:
     """Every figure of a batch by name, [B] each."""
     driven = {"outcome": episodes.outcome, "hit_while_stopped": episodes.hit_while_stopped,
-              "brakings": episodes.brakings, **episodes.measures._asdict()}  # fmt: skip
+              "brakings": episodes.brakings, "replans": episodes.replans, **episodes.measures._asdict()}  # fmt: skip
     return {name: np.asarray(value) for name, value in {**planned, **driven}.items()}
 
 

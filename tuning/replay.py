@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 
 from adwa_jax.constants import Constants, Options
@@ -14,7 +15,7 @@ from adwa_jax.plan import Plan, plan
 from adwa_jax.presets import Preset
 from adwa_jax.scenario import Scenario
 from adwa_jax.simulate import Episode, Outcome, Trace, trace
-from scenarios.padding import pad, stack
+from scenarios.padding import pad
 from tuning.evaluate import batch_of, planned_columns
 from tuning.outputs import names_as_they_are, parent_made, save_figure
 
@@ -40,7 +41,7 @@ class Replay:
         """Outcome, measures and the driven path [[x, y], ...] [m], start included."""
         episode, used = self.episode, int(self.trace.length)
         columns = {**planned_columns(self.plan), "hit_while_stopped": episode.hit_while_stopped,
-                   "brakings": episode.brakings, **episode.measures._asdict()}  # fmt: skip
+                   "brakings": episode.brakings, "replans": episode.replans, **episode.measures._asdict()}  # fmt: skip
         row = {name: np.asarray(value).item() for name, value in columns.items()}
         path = np.stack([self.trace.robot.x[:used], self.trace.robot.y[:used]], axis=-1)
         path = np.concatenate([np.asarray(self.scenario.start)[None, :2], path])
@@ -60,21 +61,18 @@ def replay(scenario: Scenario, config: Preset) -> Replay:
     batch = batch_of(scenario, constants, config.options)
     last_step = int(np.round(scenario.time_limit / constants.behaviour.dt))  # in float32, as the episode counts
     steps = max(LEAST_STEPS, 1 << (last_step - 1).bit_length())
-    lanes = stack([pad(scenario, batch.shape)])
-    planned, episode, path = jax.tree.map(lambda leaf: leaf[0], jax.device_get(
-        _replay(lanes, constants, batch.options, steps)))  # fmt: skip
+    padded = pad(scenario, batch.shape)
+    planned, episode, path = jax.device_get(_replay(padded, constants, batch.options, steps))
     return Replay(scenario, planned, episode, path, float(constants.robot.radius))
 
 
 @partial(jax.jit, static_argnames=("options", "steps"))
-def _replay(lanes: Scenario, constants: Constants, options: Options, steps: int) -> tuple[Plan, Episode, Trace]:
-    """Batched as `evaluate` is, though there is one lane: the same arithmetic, hence the same bits and outcome."""
-
-    def plan_one(scenario: Scenario) -> Plan:
-        return plan(scenario.grid, scenario.start[:2], scenario.goal, constants, options.plan)
-
-    planned = jax.lax.map(plan_one, lanes)
-    return planned, *jax.vmap(lambda one, its: trace(one, its, constants, options, steps))(lanes, planned)
+def _replay(scenario: Scenario, constants: Constants, options: Options, steps: int) -> tuple[Plan, Episode, Trace]:
+    """The same arithmetic as `evaluate`, hence the same bits and outcome."""
+    lanes = jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], scenario)
+    planned = jax.lax.map(lambda one: plan(one.grid, one.start[:2], one.goal, constants, options.plan), lanes)
+    planned = jax.tree.map(lambda leaf: leaf[0], planned)
+    return planned, *trace(scenario, planned, constants, options, steps)
 
 
 def draw_replay(driven: Replay, title: str, figure: Path, animation: Path | None = None, y_down: bool = False,

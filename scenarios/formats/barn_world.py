@@ -18,7 +18,7 @@ import numpy as np
 from adwa_jax.grid import Grid
 from adwa_jax.scenario import Scenario
 from scenarios.errors import InputError
-from scenarios.formats.leaves import leaf, no_movers, no_squares, numpy_grid
+from scenarios.formats.leaves import leaf, no_movers, no_squares, none_hidden, numpy_grid
 from scenarios.formats.map_file import MapFile
 from scenarios.formats.reading import bad_input, read_bytes, shown
 
@@ -54,17 +54,23 @@ def load_barn_world(path: str | Path) -> MapFile:
 
 
 def load_barn_scenario(world_path: str | Path, path_file: str | Path | None = None) -> Scenario:
-    """The benchmark's task in one of its worlds: numpy leaves, no unknown squares, no movers.
-
-    From (-2.25, 3.0), heading +y, to within 1 m of (-2.25, 13.0) in 100 s, on `task_grid`.
+    """The benchmark's task in one of its worlds (`barn_task`).
 
     path_file: the world's `path_<i>.npy`, which gives `reference_length` (`reference_length`); None leaves
     that at 0, for the A*-optimal length.
     """
     world = load_barn_world(world_path)
-    length = 0.0 if path_file is None else reference_length(path_file)
+    return barn_task(world.occupied, 0.0 if path_file is None else reference_length(path_file))
+
+
+def barn_task(occupied: np.ndarray, length: float) -> Scenario:
+    """The benchmark's task in a world [64, 30] bool: numpy leaves, nothing hidden, no unknown squares, no movers.
+
+    From (-2.25, 3.0), heading +y, to within 1 m of (-2.25, 13.0) in 100 s, on `task_grid`. length: that of the
+    reference path [m], or 0.
+    """
     return Scenario(
-        grid=task_grid(world.occupied),
+        grid=task_grid(occupied), hidden=none_hidden(),
         start=leaf(START, np.float32), heading_given=leaf(True, np.bool_), goal=leaf(GOAL, np.float32),
         goal_tolerance=leaf(GOAL_TOLERANCE, np.float32), time_limit=leaf(TIME_LIMIT, np.float32),
         reference_length=leaf(length, np.float32), squares=no_squares(), movers=no_movers())
@@ -100,7 +106,7 @@ def load_barn_folder(folder: str | Path) -> list[tuple[str, Scenario]]:
     for name, path in zip(names, worlds, strict=True):
         if names.count(name) > 1:
             raise bad_input(path, f"world {name} is there twice", "one file for each world", "remove one")
-    path_files = [_path_file(path) for path in worlds]
+    path_files = [path_file_of(path, _number(path), path.parent) for path in worlds]
     scenarios = map(load_barn_scenario, worlds, path_files)
     return list(zip(names, scenarios, strict=True))
 
@@ -168,6 +174,20 @@ def reference_length(path_file: str | Path) -> float:
                         "fetch the file again")
     points = np.concatenate([[START[:2]], cells * RESOLUTION + np.asarray(_PATH_ORIGIN), [GOAL]])
     return float(np.hypot(*np.diff(points, axis=0).T).sum())
+
+
+def path_file_of(where: object, number: int, folder: Path) -> Path:
+    """The `path_<number>.npy` in `folder`, or in a folder `path_files` inside or next to it.
+
+    where: the world, for the error. Raises InputError where there is none.
+    """
+    name = f"path_{number}.npy"
+    for place in (folder, folder / "path_files", folder.resolve().parent / "path_files"):
+        if (place / name).is_file():
+            return place / name
+    raise bad_input(where, f"no path file {name}",
+                    "it lies beside the world, or in a folder path_files inside or next to that folder",
+                    f"put {name} there")
 
 
 def _cylinders(path: str | Path) -> np.ndarray:
@@ -241,16 +261,9 @@ def _natural(path: Path) -> list[tuple[int, str]]:
     return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"([0-9]+)", path.name)]
 
 
-def _path_file(world: Path) -> Path:
+def _number(world: Path) -> int:
     numbers = re.findall(r"[0-9]+", _world_name(world))
     if not numbers:
         raise bad_input(world, "no number in the name",
                         "path files are found by number: path_7.npy for world_7.world", "rename the world")
-    name = f"path_{int(numbers[-1])}.npy"
-    folders = (world.parent, world.parent / "path_files", world.resolve().parent.parent / "path_files")
-    for folder in folders:
-        if (folder / name).is_file():
-            return folder / name
-    raise bad_input(world, f"no path file {name}",
-                    "it lies beside the world, or in a folder path_files inside or next to that folder",
-                    f"put {name} there")
+    return int(numbers[-1])

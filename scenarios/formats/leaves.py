@@ -23,7 +23,12 @@ def numpy_grid(occupied: np.ndarray, resolution: float, origin: tuple[float, flo
 def no_squares() -> UnknownSquares:
     """UnknownSquares with S = 0."""
     return UnknownSquares(centre=leaf(np.zeros((0, 2)), np.float32), half_width=leaf(np.zeros(0), np.float32),
-                          valid=leaf(np.zeros(0), np.bool_))
+                          rounding=leaf(np.zeros(0), np.float32), valid=leaf(np.zeros(0), np.bool_))
+
+
+def none_hidden() -> Any:
+    """`Scenario.hidden` of a world that is all on the map."""
+    return leaf(np.zeros((0, 0)), np.bool_)
 
 
 def tracked_movers(track: np.ndarray, track_length: np.ndarray, radius: float) -> Movers:

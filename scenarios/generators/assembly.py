@@ -5,6 +5,7 @@ Dimension letters: S unknown squares, M movers, J track points.
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -42,10 +43,16 @@ def centre(cell: Cell, resolution: float, origin: Point = (0.0, 0.0)) -> Point:
 
 
 def squares_of(centres: Sequence[Point], half_width: float) -> UnknownSquares:
-    """Unknown squares, all of one size, in [S] arrays."""
+    """Unknown squares with sharp corners, all of one size, in [S] arrays."""
     count = len(centres)
     valid: Any = np.ones(count, np.bool_)
-    return UnknownSquares(float32(centres, count, 2), float32(np.full(count, half_width)), valid)
+    half_widths, rounding = float32(np.full(count, half_width)), float32(np.zeros(count))
+    return UnknownSquares(float32(centres, count, 2), half_widths, rounding, valid)
+
+
+def discs_in(squares: UnknownSquares) -> UnknownSquares:
+    """In place of sharp squares the discs that touch their sides."""
+    return replace(squares, half_width=squares.rounding, rounding=squares.half_width)
 
 
 def movers_of(radius: Sequence[float], position: Sequence[Point], velocity: Sequence[Point],
@@ -94,5 +101,6 @@ def scenario_of(grid: Grid, start: Point, goal: Point, spec: TaskSpec, squares: 
     """
     bearing = math.atan2(goal[1] - start[1], goal[0] - start[0]) if heading is None else heading
     given: Any = np.asarray(heading is not None, np.bool_)
-    return Scenario(grid, float32([*start, bearing]), given, float32(goal), float32(spec.goal_tolerance),
-                    float32(spec.time_limit), float32(0.0), squares, movers)
+    hidden: Any = np.zeros((0, 0), np.bool_)
+    return Scenario(grid, hidden, float32([*start, bearing]), given, float32(goal),
+                    float32(spec.goal_tolerance), float32(spec.time_limit), float32(0.0), squares, movers)

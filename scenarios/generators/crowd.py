@@ -164,7 +164,8 @@ def _stretch(draws: Draws, duration: float, tracks: Sequence[np.ndarray]) -> lis
     """The tracks within a random stretch of the recording, cut at its ends; t = 0 at its beginning."""
     first, last = min(track[0, 0] for track in tracks), max(track[-1, 0] for track in tracks)
     begin = draws.uniform(first, max(first, last - duration))
-    cut = [_cut(np.asarray(track, np.float64), begin, begin + duration) for track in tracks]
+    seen = [track for track in tracks if track[0, 0] < begin + duration and track[-1, 0] > begin]
+    cut = [_cut(np.asarray(track, np.float64), begin, begin + duration) for track in seen]
     return [track for track in cut if len(track) >= 2]
 
 

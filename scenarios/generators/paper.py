@@ -6,7 +6,7 @@ import jax
 import numpy as np
 
 from adwa_jax.scenario import Scenario
-from scenarios.generators.assembly import centre, grid_of, scenario_of
+from scenarios.generators.assembly import centre, discs_in, grid_of, scenario_of
 from scenarios.generators.connectivity import carved, joined
 from scenarios.generators.draws import Draws, streams_of
 from scenarios.generators.movers import crossing_movers
@@ -26,17 +26,21 @@ class PaperSpec(TaskSpec):
     The paper prints maps of 15, 20 and 25 cells but neither density nor counts of obstacles: those are our
     choice. `movers` None: 8 on 25 × 25 cells and in proportion to the area (3 on 15², 5 on 20²). `time_limit`
     is some 2.5 times what a robot of 1 m/s needs across 25 cells a side; larger maps want about 4 s a cell.
+    Unknown obstacles are squares, or discs (`unknown_shape`) of `square_half_width` around the same centres.
     """
 
     cells: int = 25
     density: float = 0.2
     movers: int | None = None
+    unknown_shape: str = "square"
     time_limit: float = 100.0
 
     def __post_init__(self):
         demand_count("cells", self.cells, 8, 4096)
         super().__post_init__()
         demand_number("density", self.density, 0.0, 0.9)
+        demand(self.unknown_shape in ("square", "disc"), "unknown_shape", self.unknown_shape, "must be square or disc",
+               "choose one")
         demand(self.robot_radius < RESOLUTION / 2, "robot_radius", self.robot_radius,
                "the robot must fit into a cell, half of 1 m to each side", "take less than 0.5 m")
         demand(self.mover_radius[1] <= self.cells / 4, "mover_radius", self.mover_radius,
@@ -58,6 +62,8 @@ def generate(key: jax.Array, spec: PaperSpec) -> Scenario:
     start, goal = (spec.cells - 1, 0), (0, spec.cells - 1)
     occupied = _draw_map(streams.map, spec, start, goal)
     squares = place_squares(streams.squares, occupied, occupied, start, goal, spec, RESOLUTION)
+    if spec.unknown_shape == "disc":
+        squares = discs_in(squares)
     movers = crossing_movers(streams.movers, occupied, start, goal, spec, RESOLUTION)
     ends = centre(start, RESOLUTION), centre(goal, RESOLUTION)
     return scenario_of(grid_of(occupied, RESOLUTION), *ends, spec, squares, movers)

@@ -47,6 +47,7 @@ def sensed(squares=(), movers=(), capacity=3):
         velocity=jnp.asarray([mover[1] for mover in pad_movers], jnp.float32),
         radius=jnp.asarray([mover[2] for mover in pad_movers], jnp.float32),
         seen=jnp.arange(capacity) < len(movers),
+        square_rounding=jnp.zeros(capacity, jnp.float32),
     )
 
 

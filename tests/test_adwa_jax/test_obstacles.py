@@ -1,5 +1,6 @@
 """Movers in time, sensing, and distances to unknown obstacles."""
 
+import dataclasses
 import math
 
 import jax
@@ -108,6 +109,7 @@ def test_padding_is_never_present_and_kinds_mix():
 SQUARES = UnknownSquares(
     centre=jnp.float32([(3.0, 0.0), (0.0, -5.0), (0.0, 2.0)]),
     half_width=jnp.float32([1.0, 1.0, 1.0]),
+    rounding=jnp.zeros(3, jnp.float32),
     valid=jnp.array([True, True, False]),
 )
 
@@ -129,6 +131,15 @@ def test_range_is_measured_to_the_outline_and_touching_it_counts():
     np.testing.assert_array_equal(sensed_from((0, 0), nothing, 99.0).seen, [True, True, False, False])
 
 
+def test_range_is_measured_to_the_outline_of_a_disc():
+    disc = dataclasses.replace(SQUARES, half_width=jnp.zeros(3), rounding=jnp.full(3, 0.5))
+    for sensor_range, known in ((2.49, False), (2.5, True)):
+        seen = sensed(disc, jnp.zeros(3, bool), movers({}), states_at(movers({}), jnp.float32(0.0)),
+                      jnp.zeros(2), jnp.float32(sensor_range))
+        assert bool(seen.square_known[0]) == known
+    np.testing.assert_array_equal(seen.square_rounding, disc.rounding)
+
+
 def test_squares_stay_known_and_movers_do_not():
     later = sensed_from((-50, 0), [True, False, False], 2.5)
     np.testing.assert_array_equal(later.square_known, [True, False, False])
@@ -143,6 +154,7 @@ KNOWN = Sensed(
     velocity=jnp.float32([(-1.0, 2.0), (0.0, 0.0)]),
     radius=jnp.float32([0.25, 1.0]),
     seen=jnp.array([True, False]),
+    square_rounding=jnp.zeros(2, jnp.float32),
 )
 
 
@@ -151,6 +163,18 @@ def test_distances_to_squares_by_hand():
     # Beside: 1.5. Above: 2.5. Corner (2.5, 0.5): √(2.5² + 4²). Inside and on the corner: 0. The other is not known.
     expected = [1.5, 2.5, math.hypot(2.5, 4.0), 0.0, 0.0]
     np.testing.assert_allclose(clearance_to_squares(KNOWN, x, y), expected, rtol=1e-6)
+
+
+@pytest.mark.parametrize(("half_width", "rounding", "expected"), [
+    (0.0, 0.5, [1.5, 4.5, -0.5, math.sqrt(2.0) - 0.5]),
+    (0.5, 0.25, [1.25, 4.25, -0.25, math.sqrt(0.5) - 0.25]),
+    (0.5, 0.0, [1.5, 4.5, 0.0, math.sqrt(0.5)]),
+], ids=["disc", "rounded", "sharp"])  # fmt: skip
+def test_distances_to_discs_and_rounded_squares_by_hand(half_width, rounding, expected):
+    known = KNOWN._replace(square_half_width=jnp.full(2, half_width), square_rounding=jnp.full(2, rounding))
+    # The centre is (3, 1): 2 m beside it, 5 m above it, in it, and on its diagonal.
+    x, y = jnp.float32([(1.0, 1.0), (3.0, 6.0), (3.0, 1.0), (4.0, 2.0)]).T
+    np.testing.assert_allclose(clearance_to_squares(known, x, y), expected, rtol=1e-6)
 
 
 def test_movers_are_met_where_they_will_be():
@@ -162,7 +186,7 @@ def test_movers_are_met_where_they_will_be():
 
 def test_nothing_known_is_far_away_and_finite():
     nothing = KNOWN._replace(square_known=jnp.array([False, False]), seen=jnp.array([False, False]))
-    none_at_all = Sensed(*(leaf[:0] for leaf in KNOWN))
+    none_at_all = jax.tree.map(lambda leaf: leaf[:0], KNOWN)
     for known in (nothing, none_at_all):
         for distance in (clearance_to_squares(known, jnp.float32([0.0]), jnp.float32([0.0])),
                          clearance_to_movers(known, jnp.float32([0.0]), jnp.float32([0.0]), jnp.float32(1.0))):
@@ -181,13 +205,14 @@ def test_many_obstacles_equal_few_of_them():
         velocity=jnp.asarray(random.uniform(-1, 1, (count, 2)), jnp.float32),
         radius=jnp.asarray(random.uniform(0.1, 0.5, count), jnp.float32),
         seen=jnp.asarray(random.random(count) < 0.7),
+        square_rounding=jnp.asarray(random.choice([0.0, 0.3], count), jnp.float32),
     )
     x, y = jnp.asarray(random.uniform(-6, 6, (2, 30)), jnp.float32)
     squares, discs = clearance_to_squares(many, x, y), clearance_to_movers(many, x, y, jnp.float32(0.5))
     for k in range(30):
         here = (float(x[k]), float(y[k]))
         expected = min(square_distance(*here, many.square_centre[i].tolist(), float(many.square_half_width[i]))
-                       for i in range(count) if many.square_known[i])
+                       - float(many.square_rounding[i]) for i in range(count) if many.square_known[i])
         assert float(squares[k]) == pytest.approx(expected, abs=1e-5)
         expected = min(math.dist(here, (many.position[i] + 0.5 * many.velocity[i]).tolist()) - float(many.radius[i])
                        for i in range(count) if many.seen[i])

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from adwa_jax.constants import Behaviour, Options, PlanOptions
-from adwa_jax.dwa import DwaOptions
+from adwa_jax.constants import DwaOptions
 from adwa_jax.plan import plan
 from adwa_jax.presets import paper
 from adwa_jax.scenario import Movers, Scenario, UnknownSquares
@@ -54,13 +54,15 @@ def scenario(occupied, start, goal, *, squares=(), movers=(), heading=None, time
     boxes, discs = jnp.asarray(fill_squares, jnp.float32), jnp.asarray(fill_movers, jnp.float32)
     return Scenario(
         grid=grid_of(occupied, shape),
+        hidden=jnp.zeros((0, 0), bool),
         start=jnp.asarray([*start, 0.0 if heading is None else heading], jnp.float32),
         heading_given=jnp.bool_(heading is not None),
         goal=jnp.asarray(goal, jnp.float32),
         goal_tolerance=jnp.float32(0.4),
         time_limit=jnp.float32(time_limit),
         reference_length=jnp.float32(reference_length),
-        squares=UnknownSquares(boxes[:, :2], boxes[:, 2], jnp.arange(CAPACITY) < len(squares)),
+        squares=UnknownSquares(boxes[:, :2], boxes[:, 2], jnp.zeros(CAPACITY, jnp.float32),
+                               jnp.arange(CAPACITY) < len(squares)),
         movers=Movers(
             radius=discs[:, 4], position=discs[:, :2], velocity=discs[:, 2:4],
             low=jnp.zeros((CAPACITY, 2), jnp.float32), high=jnp.full((CAPACITY, 2), 12.0, jnp.float32),

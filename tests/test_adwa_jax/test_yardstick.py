@@ -139,7 +139,7 @@ def _decide_all(scenes) -> Decision:
 def _decide_one(occupied, state, local, goal, disc) -> Decision:
     count = disc.shape[0]
     no_squares = jnp.zeros((0, 2)), jnp.zeros(0), jnp.zeros(0, bool)
-    sensed = Sensed(*no_squares, disc[:, :2], disc[:, 2:4], disc[:, 4], jnp.ones(count, bool))
+    sensed = Sensed(*no_squares, disc[:, :2], disc[:, 2:4], disc[:, 4], jnp.ones(count, bool), jnp.zeros(0))
     robot = RobotLimits(0.25, 0.0, 1.0, 1.5, acceleration=1.0, yaw_acceleration=3.0, brake=1.0, yaw_brake=1e9)
     weights = ScoreWeights(0.4, 0.2, 0.2, 0.1)
     return decide(

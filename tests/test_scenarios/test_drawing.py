@@ -4,10 +4,21 @@ import pytest
 from matplotlib.colors import to_hex
 from matplotlib.patches import Circle, Rectangle
 
-from scenarios.drawing import OCCUPIED, contact_sheet, draw_map, draw_scenario, extent, mover_ways
+from adwa_jax.scenario import UnknownSquares
+from scenarios.drawing import (
+    OCCUPIED,
+    contact_sheet,
+    draw_hidden,
+    draw_map,
+    draw_scenario,
+    draw_squares,
+    extent,
+    mover_ways,
+)
 from scenarios.errors import InputError
 from scenarios.generators import toy
 from scenarios.generators.assembly import grid_of, walkers_of
+from scenarios.hiding import hide
 from scenarios.padding import pad, padded_shape
 from scenarios.suite import Suite
 
@@ -67,6 +78,36 @@ def test_a_scenario_shows_its_ends_squares_and_movers_to_scale(scenario):
     assert way.get_xydata()[[0, -1]] == pytest.approx(np.array([[0.5, 0.5], [1.5, 0.5]]))  # 0.5 m/s for 2 s
 
 
+def test_hidden_cells_are_hatched_cells_and_known_ones_are_not(scenario):
+    drawn = hide(scenario)
+    ax = draw_scenario(pad(drawn, padded_shape(drawn)))
+    (cells,) = (drawn for drawn in ax.collections if drawn.get_hatch())
+    assert [path.vertices[:4].tolist() for path in cells.get_paths()] == [
+        [[1.0, 1.0], [2.0, 1.0], [2.0, 2.0], [1.0, 2.0]], [[2.0, 1.0], [3.0, 1.0], [3.0, 2.0], [2.0, 2.0]]]
+    assert not ax.images[0].get_array().any()
+    assert "hidden cell" in [text.get_text() for text in ax.get_legend().get_texts()]
+
+
+def test_hidden_cells_lie_where_the_map_does():
+    hidden = np.array([[False, True]])
+    (cells,) = draw_hidden(grid_of(~hidden, 0.5, (-1.0, 2.0)), hidden, draw_map(grid_of(~hidden, 0.5, (-1.0, 2.0))))
+    assert cells.get_paths()[0].vertices[:4].tolist() == [[-0.5, 2.0], [0.0, 2.0], [0.0, 2.5], [-0.5, 2.5]]
+
+
+def test_unknown_discs_and_rounded_squares_are_drawn_to_scale(scenario):
+    centre = np.float32([(0.5, 1.5), (3.5, 1.5), (2.5, 2.5)])
+    unknown = UnknownSquares(centre, np.float32([0.0, 0.2, 0.3]), np.float32([0.4, 0.1, 0.0]), np.ones(3, bool))
+    disc, rounded, sharp = draw_squares(unknown, draw_map(scenario.grid))
+    assert (disc.get_center(), disc.get_radius()) == (pytest.approx((0.5, 1.5)), pytest.approx(0.4))
+    outline = rounded.get_path().get_extents()
+    assert (outline.p0, outline.p1) == (pytest.approx([3.2, 1.2]), pytest.approx([3.8, 1.8]))
+    assert not rounded.get_path().contains_point((3.22, 1.22))
+    assert isinstance(sharp, Rectangle)
+    labels = [patch.get_label() for patch in (disc, rounded, sharp)]
+    assert labels == ["unknown disc", "unknown square", "_"]
+    assert all(patch.get_hatch() for patch in (disc, rounded, sharp))
+
+
 def test_an_arrowhead_points_where_its_mover_goes():
     def heads(mark, y_down):
         drawn = draw_scenario(toy.generate(KEY, toy.ToySpec(drawing=DRAWING.replace(">", mark))), None, y_down, 1.0)
@@ -87,6 +128,13 @@ def test_a_way_is_broken_while_its_mover_is_absent():
     assert ways[15, 0] == pytest.approx((3.0, 3.0))
 
 
+def test_a_way_is_broken_where_its_mover_is_put_elsewhere():
+    track = np.array([[0.0, 0.0, 3.0], [1.0, 5.0, 3.0]])  # 5 m in 1 s, then back at once
+    way = mover_ways(walkers_of([0.3], [track], [1.0]), 1.5)[:, 0]
+    assert np.isfinite(way).all(axis=1).tolist() == [True] * 9 + [False] + [True] * 6
+    assert way[[8, 10], 0] == pytest.approx([4.0, 0.0], abs=1e-4)
+
+
 def test_the_legend_names_each_kind_once(scenario):
     texts = [text.get_text() for text in draw_scenario(scenario).get_legend().get_texts()]
     assert texts == ["start", "goal", "unknown square", "mover", "way of a mover"]
@@ -101,6 +149,12 @@ def test_a_contact_sheet_has_a_tile_for_each_scenario_up_to_the_limit(scenario, 
     assert titles == ["a\n4 m × 3 m", "b\n4 m × 3 m", "c\n4 m × 3 m"]
     assert figure.get_suptitle() == "toys: 3 of 5"
     assert path.read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_contact_sheet_turns_maps_whose_y_points_down(scenario):
+    for y_down in (False, True):
+        tiles = [ax for ax in contact_sheet([scenario] * 2, y_down=y_down).axes if ax.axison]
+        assert [ax.yaxis_inverted() for ax in tiles] == [y_down] * 2
 
 
 def test_a_contact_sheet_of_a_list_takes_the_names_given(scenario):

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from adwa_jax.grid import Grid, inflate
 from adwa_jax.obstacles import movers_at
 from scenarios.errors import InputError
-from scenarios.generators import barn, blocks, crowd, maze, on_map, paper, rooms, toy
+from scenarios.generators import barn, blocks, crowd, dynabarn, maze, on_map, paper, rooms, toy
 from scenarios.generators.assembly import grid_of
 from scenarios.generators.connectivity import carved, components, inflated
 from scenarios.generators.draws import streams_of
@@ -174,8 +174,8 @@ def test_leaves_are_numpy_of_the_documented_types(kind):
     f, i, b = np.float32, np.int32, np.bool_
     expected = [
         (b, (rows, columns)), (i, ()), (i, ()), (f, ()), (f, (2,)),
-        (f, (3,)), (b, ()), (f, (2,)), (f, ()), (f, ()), (f, ()),
-        (f, (squares, 2)), (f, (squares,)), (b, (squares,)),
+        (b, (0, 0)), (f, (3,)), (b, ()), (f, (2,)), (f, ()), (f, ()), (f, ()),
+        (f, (squares, 2)), (f, (squares,)), (f, (squares,)), (b, (squares,)),
         (f, (movers,)), (f, (movers, 2)), (f, (movers, 2)), (f, (movers, 2)), (f, (movers, 2)),
         (f, (movers, points, 3)), (i, (movers,)), (f, (movers,)), (b, (movers,)),
     ]  # fmt: skip
@@ -416,6 +416,94 @@ def test_real_pedestrians_make_a_crowd(data_folder):
         states = kernel_movers_at(scenario.movers, jnp.float32(0.0))
         here = np.asarray(states.position)[np.asarray(states.present)]
         assert (np.linalg.norm(here - scenario.start[:2], axis=1) > spec.mover_distance).all()
+
+
+# Recorded key frames
+
+SHUTTLE = np.array([[0.0, -10.0, 0.0], [4.0, 0.0, 0.0], [10.0, 0.0, 8.0]])
+"""2.5 m/s, then 4/3 m/s, then at once back."""
+AT_START = np.array([[0.0, 10.0, 0.0], [4.0, 10.0, 0.0], [5.0, 10.0, -9.0], [20.0, 10.0, -9.0]])
+
+
+def expected_on(track, time):
+    now = time % track[-1, 0]
+    return [np.interp(now, track[:, 0], track[:, axis]) for axis in (1, 2)]
+
+
+def test_a_track_is_cut_where_the_episode_begins():
+    jump = dynabarn.JUMP
+    expected = [[0, -5, 0], [2, 0, 0], [8, 0, 8], [8 + jump, -10 + 2.5 * jump, 0], [10, -5, 0]]
+    np.testing.assert_allclose(dynabarn.shifted(SHUTTLE, 2.0), expected, rtol=1e-12)
+    np.testing.assert_allclose(dynabarn.shifted(SHUTTLE, 42.0), expected, rtol=1e-12)
+    np.testing.assert_array_equal(dynabarn.shifted(SHUTTLE, 30.0), SHUTTLE)
+    on_a_frame = [[0, 0, 0], [6, 0, 8], [6 + jump, -10 + 2.5 * jump, 0], [10, 0, 0]]
+    np.testing.assert_allclose(dynabarn.shifted(SHUTTLE, 4.0), on_a_frame, rtol=1e-12)
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.005, 3.995, 4.005, 9.995, 123.455])
+def test_movers_are_where_the_world_has_them_at_that_time_and_never_seen_on_the_way_back(offset):
+    tracks = [SHUTTLE, AT_START]
+    scenario = dynabarn.beginning_at(offset, dynabarn.DynabarnSpec(), tracks)
+    for step in range(600):
+        state = kernel_movers_at(scenario.movers, jnp.float32(step * 0.1))
+        assert state.present.all()
+        expected = [expected_on(track, offset + step * 0.1) for track in tracks]
+        if offset:  # at 0 the jumps fall on control steps, where either end will do
+            np.testing.assert_allclose(state.position, expected, atol=1e-4)
+        assert np.linalg.norm(state.velocity, axis=1).max() <= 9.001
+
+
+def test_the_task_is_the_benchmarks():
+    scenario = dynabarn.beginning_at(0.0, dynabarn.DynabarnSpec(), [SHUTTLE])
+    np.testing.assert_array_equal(scenario.start, np.float32([11.0, 0.0, math.pi]))
+    assert scenario.heading_given
+    np.testing.assert_array_equal(scenario.goal, [-9.0, 0.0])
+    assert (scenario.goal_tolerance, scenario.time_limit, scenario.reference_length) == (1.0, 60.0, 0.0)
+    np.testing.assert_array_equal(scenario.grid.origin, [-10.0, -10.0])
+    assert scenario.grid.occupied.shape == (40, 46)
+    assert not scenario.grid.occupied.any()
+    np.testing.assert_array_equal(scenario.movers.period, [10.0])
+    np.testing.assert_array_equal(scenario.movers.radius, [0.5])
+
+
+def test_no_episode_begins_with_a_mover_at_the_start_if_that_can_be():
+    spec = dynabarn.DynabarnSpec()
+    for seed in range(20):
+        scenario = dynabarn.generate(jax.random.key(seed), spec, [AT_START])
+        assert math.dist(scenario.movers.position[0], scenario.start[:2]) > spec.mover_distance
+    always_there = AT_START * (1.0, 1.0, 0.0)
+    assert dynabarn.generate(jax.random.key(0), spec, [always_there]).movers.valid.all()
+
+
+def test_times_differ_and_come_from_the_key():
+    first, again, other = (dynabarn.generate(jax.random.key(seed), dynabarn.DynabarnSpec(), [SHUTTLE])
+                           for seed in (0, 0, 1))
+    assert same_bits(first, again)
+    assert not same_bits(first, other)
+
+
+def test_dynabarn_takes_no_other_obstacles():
+    with pytest.raises(InputError, match="squares, movers: \\(0, 3\\); movers are those of the world"):
+        dynabarn.DynabarnSpec(movers=3)
+
+
+# Unknown discs
+
+
+def test_discs_take_the_place_of_the_squares():
+    squares, discs = (paper.generate(jax.random.key(3), paper.PaperSpec(cells=15, unknown_shape=shape))
+                      for shape in ("square", "disc"))
+    np.testing.assert_array_equal(discs.squares.centre, squares.squares.centre)
+    np.testing.assert_array_equal(squares.squares.half_width, np.full(5, 0.3, np.float32))
+    np.testing.assert_array_equal(discs.squares.rounding, np.full(5, 0.3, np.float32))
+    assert not discs.squares.half_width.any()
+    assert not squares.squares.rounding.any()
+    assert same_bits(dataclasses.replace(discs, squares=squares.squares), squares)
+
+
+def test_another_shape_of_unknown_obstacle_is_refused():
+    with pytest.raises(InputError, match="unknown_shape: 'star'; must be square or disc; choose one"):
+        paper.PaperSpec(unknown_shape="star")
 
 
 def test_a_toy_is_as_drawn():

@@ -8,6 +8,7 @@ import pytest
 from adwa_jax.grid import inflate
 from adwa_jax.obstacles import movers_at
 from scenarios.generators import crowd, paper, toy
+from scenarios.hiding import hide
 from scenarios.padding import PaddedShape, pad, padded_shape, stack
 
 KEY = jax.random.key(11)
@@ -83,6 +84,26 @@ def test_padding_moves_no_mover(scenario):
         np.testing.assert_array_equal(after.position[:count], before.position)
         np.testing.assert_array_equal(after.velocity[:count], before.velocity)
         assert np.isfinite(np.asarray(after.position)).all()
+
+
+def test_hidden_cells_are_padded_with_cells_that_are_not_hidden():
+    scenario = hide(paper.generate(KEY, paper.PaperSpec(cells=15)))
+    shape = padded_shape(scenario)
+    assert shape.hidden
+    assert not padded_shape(paper.generate(KEY, paper.PaperSpec(cells=15))).hidden
+    padded = pad(scenario, shape)
+    np.testing.assert_array_equal(padded.hidden, np.pad(scenario.hidden, ((0, 1), (0, 1))))
+    assert padded.grid.occupied[15].all()
+    with pytest.raises(ValueError, match="must hold the scenario's"):
+        pad(scenario, dataclasses.replace(shape, hidden=False))
+
+
+def test_one_that_hides_nothing_stacks_with_one_that_does():
+    open_map = paper.generate(KEY, paper.PaperSpec(cells=15))
+    shape = padded_shape(hide(open_map))
+    batch = stack([pad(scenario, shape) for scenario in (open_map, hide(open_map))])
+    assert batch.hidden.shape == (2, 16, 16)
+    np.testing.assert_array_equal(batch.hidden.any(axis=(1, 2)), [False, True])
 
 
 def test_padding_inflates_no_cell_of_the_map():

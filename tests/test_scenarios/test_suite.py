@@ -1,5 +1,6 @@
 import io
 import json
+import os
 import zipfile
 
 import jax
@@ -10,6 +11,7 @@ from scenarios import suite as suite_module
 from scenarios.errors import InputError
 from scenarios.generators import paper
 from scenarios.generators.assembly import grid_of
+from scenarios.generators.crowd import CrowdSpec
 from scenarios.suite import (
     SUITE_NAMES,
     Suite,
@@ -17,7 +19,11 @@ from scenarios.suite import (
     make_suite,
     save_suite,
     suite_from_barn_folder,
+    suite_from_barn_grids,
+    suite_from_dynabarn,
+    suite_from_tracks,
     suite_on_map,
+    without_maps,
 )
 
 
@@ -152,6 +158,126 @@ def test_a_folder_of_barn_worlds_is_a_suite(data_folder):
     assert all(scenario.reference_length > 0 for scenario in suite.scenarios)
 
 
+@pytest.mark.realdata
+def test_all_barn_worlds_make_a_suite_and_its_twin_without_maps(data_folder):
+    known, sensed = (suite_from_barn_grids(data_folder / "barn" / "grids.npz", only) for only in (False, True))
+    assert known.names == sensed.names
+    assert len(known.names) == 125
+    assert (known.name, sensed.name) == ("barn-grids", "barn-grids-sensed")
+    for one, other in zip(known.scenarios, sensed.scenarios, strict=True):
+        assert one.hidden.shape == (0, 0)
+        np.testing.assert_array_equal(other.hidden, one.grid.occupied)
+        assert not other.grid.occupied.any()
+        assert other.reference_length == one.reference_length > 0
+
+
+KEY_FRAMES = """world,obstacle,period_s,t_s,x_m,y_m
+4,0,10,0,-10,0
+4,0,10,10,5,8
+22,0,5,0,3,-10
+22,0,5,5,3,10
+22,1,7,0,0,-10
+22,1,7,7,3,9
+"""
+
+
+@pytest.fixture
+def key_frames(tmp_path):
+    path = tmp_path / "keyframes.csv"
+    path.write_text(KEY_FRAMES)
+    return path
+
+
+def test_each_dynabarn_world_begins_at_its_beginning_and_then_at_other_times(key_frames):
+    short, long = (suite_from_dynabarn(key_frames, seed=1, starts=starts) for starts in (2, 4))
+    assert short.names == ("world_4-tier1-start00", "world_22-tier2-start00", "world_4-tier1-start01",
+                           "world_22-tier2-start01")
+    assert short.names == long.names[:4]
+    assert all(same_bits(a, b) for a, b in zip(short.scenarios, long.scenarios[:4], strict=True))
+    np.testing.assert_array_equal(short.scenarios[0].movers.position, [[-10.0, 0.0]])
+    np.testing.assert_array_equal(short.scenarios[1].movers.position, [[3.0, -10.0], [0.0, -10.0]])
+    beginnings = {tuple(scenario.movers.position[0].tolist()) for scenario in long.scenarios[::2]}
+    assert len(beginnings) == 4
+    other = suite_from_dynabarn(key_frames, seed=2, starts=2)
+    assert same_bits(other.scenarios[0], short.scenarios[0])
+    assert not same_bits(other.scenarios[2], short.scenarios[2])
+
+
+def test_dynabarn_refuses_bad_numbers(key_frames):
+    for starts in (0, 1.5, True):
+        with pytest.raises(InputError, match=f"starts: {starts}; must be a whole number from 1"):
+            suite_from_dynabarn(key_frames, seed=1, starts=starts)
+    with pytest.raises(InputError, match="seed: -1; must be a whole number"):
+        suite_from_dynabarn(key_frames, seed=-1)
+
+
+@pytest.mark.realdata
+def test_the_dynabarn_worlds_make_a_thousand_scenarios(data_folder):
+    suite = suite_from_dynabarn(data_folder / "dynabarn" / "keyframes.csv", seed=0)
+    assert len(suite.scenarios) == len(set(suite.names)) == 1020
+    assert [sum(f"tier{tier}" in name for name in suite.names) for tier in (1, 2, 3)] == [340, 340, 340]
+    gaps = [np.hypot(*(scenario.movers.position - scenario.start[:2]).T).min() for scenario in suite.scenarios]
+    assert min(gaps) >= 1.0  # those from the beginning of a world
+    assert min(gaps[30:]) > 1.3
+
+
+@pytest.fixture
+def recordings(tmp_path):
+    folder = tmp_path / "people"
+    folder.mkdir()
+    for name, y in (("b", 9), ("a", 5)):
+        rows = [f"{frame} {person} {frame / 50 + person} {y}" for frame in range(0, 500, 10) for person in range(3)]
+        (folder / f"{name}.txt").write_text("\n".join([*rows, "0 9 0 0", "10 9 0 0.5"]))
+    return folder
+
+
+def test_recordings_are_taken_in_turn_and_a_longer_suite_begins_with_the_shorter_one(recordings):
+    short, long = (suite_from_tracks(recordings, seed=3, count=count) for count in (3, 5))
+    assert short.names == ("a-3-00000", "b-3-00001", "a-3-00002")
+    assert short.names == long.names[:3]
+    assert all(same_bits(a, b) for a, b in zip(short.scenarios, long.scenarios[:3], strict=True))
+    # The place is the box of all recorded points with 1 m around it, in cells of half a metre.
+    assert [scenario.grid.occupied.shape[0] for scenario in short.scenarios] == [14, 22, 14]
+    assert long.recipe["files"] == [str(recordings / "a.txt"), str(recordings / "b.txt")]
+
+
+def test_files_are_taken_in_the_order_given_with_the_spec_given(recordings):
+    files = [recordings / "b.txt", recordings / "a.txt"]
+    suite = suite_from_tracks(files, seed=3, count=2, spec=CrowdSpec(time_limit=4.0, mover_radius=(0.3, 0.3)))
+    assert suite.names == ("b-3-00000", "a-3-00001")
+    assert all(scenario.time_limit == 4.0 for scenario in suite.scenarios)
+    assert all((scenario.movers.radius == np.float32(0.3)).all() for scenario in suite.scenarios)
+    assert suite_from_tracks(files[0], seed=3, count=1).names == ("b-3-00000",)
+
+
+def test_sources_without_recordings_are_refused(tmp_path):
+    with pytest.raises(InputError, match=r"no \.txt file; recordings are files of rows"):
+        suite_from_tracks(tmp_path, seed=0, count=1)
+    with pytest.raises(InputError, match="no such file"):
+        suite_from_tracks(tmp_path / "none.txt", seed=0, count=1)
+
+
+@pytest.mark.realdata
+def test_real_people_make_scenarios_with_room_at_the_start(data_folder):
+    suite = suite_from_tracks(data_folder / "pedestrians" / "ucy", seed=0, count=40)
+    assert {name.split("-")[0] for name in suite.names} == {"crowds_zara01", "crowds_zara03"}
+    for scenario in suite.scenarios:
+        first = scenario.movers.track[:, 0]
+        gaps = np.hypot(*(first[:, 1:] - scenario.start[:2]).T)[first[:, 0] <= 0.0]
+        assert (gaps > 2.0).all()
+        assert len(scenario.movers.valid) > 10
+
+
+def test_a_suite_without_maps_keeps_names_tasks_and_shared_maps():
+    grid = grid_of(np.pad(np.ones((4, 4), np.bool_), 20), 0.2)
+    suite = suite_on_map("hall", grid, seed=1, count=3)
+    twin = without_maps(suite)
+    assert (twin.name, twin.names) == ("hall-sensed", suite.names)
+    assert len({id(scenario.hidden) for scenario in twin.scenarios}) == 1
+    assert all(scenario.hidden.sum() == 16 for scenario in twin.scenarios)
+    assert twin.recipe["of"] == suite.recipe
+
+
 # The file
 
 
@@ -162,6 +288,18 @@ def test_a_suite_comes_back_bit_for_bit(tmp_path):
     assert (again.name, again.names, again.recipe) == (suite.name, suite.names, suite.recipe)
     assert len(again.scenarios) == len(suite.scenarios) == 2 * len(SUITE_NAMES)
     assert all(same_bits(a, b) for a, b in zip(again.scenarios, suite.scenarios, strict=True))
+
+
+def test_hidden_cells_and_discs_come_back_and_shared_ones_are_kept_once(tmp_path):
+    grid = grid_of(np.pad(np.ones((4, 4), np.bool_), 20), 0.2)
+    hidden = without_maps(suite_on_map("hall", grid, seed=1, count=2)).scenarios
+    disc = paper.generate(jax.random.key(0), paper.PaperSpec(cells=15, unknown_shape="disc"))
+    save_suite(Suite("some", (*hidden, disc), ("a", "b", "c"), {}), tmp_path / "some")
+    again = load_suite(tmp_path / "some").scenarios
+    assert all(same_bits(a, b) for a, b in zip(again, (*hidden, disc), strict=True))
+    assert again[0].hidden is again[1].hidden
+    with np.load(tmp_path / "some") as archive:
+        assert archive["hidden"].size == 44 * 44
 
 
 def test_an_empty_suite_comes_back(tmp_path):
@@ -185,6 +323,24 @@ def test_a_failed_save_leaves_the_old_file_and_nothing_else(saved, monkeypatch):
 def test_saving_into_a_missing_folder_is_refused(tmp_path):
     with pytest.raises(InputError, match="cannot be written"):
         save_suite(Suite("none", (), (), {}), tmp_path / "absent" / "none")
+
+
+@pytest.mark.parametrize("kind", ["pipe", "link", "broken link", "folder"])
+def test_what_is_no_regular_file_is_not_replaced(tmp_path, kind):
+    path, other = tmp_path / "odd", tmp_path / "other"
+    if kind == "pipe":
+        os.mkfifo(path)
+    elif kind == "folder":
+        path.mkdir()
+    else:
+        path.symlink_to(other)
+        if kind == "link":
+            other.write_text("kept")
+    before = os.lstat(path)
+    with pytest.raises(InputError, match="odd: is no regular file; a suite replaces a file or makes one; "):
+        save_suite(Suite("none", (), (), {}), path)
+    assert os.lstat(path) == before
+    assert [file.name for file in tmp_path.iterdir() if file != other] == ["odd"]
 
 
 def test_a_leaf_of_the_wrong_type_is_not_saved(tmp_path):
@@ -252,7 +408,7 @@ def test_a_damaged_file_never_loads_as_something_else(saved):
 
 def test_another_version_is_refused_with_the_way_to_remake_it(saved):
     message = refusal_of(rewritten_header(saved, version=7))
-    assert "suite format version 7; this program reads version 1" in message
+    assert "suite format version 7; this program reads version 2" in message
     assert "make_suite('crowd', seed=3, count=4)" in message
 
 
@@ -274,6 +430,8 @@ def test_another_version_with_an_unknown_recipe_shows_the_recipe(saved):
         ({"movers.valid.shape": np.full((4, 1), 11)}, "array 'movers.valid.shape' holds sizes other than M"),
         ({"grid": np.array([0, 1, 2, 9], np.int32)}, "array 'grid' does not give one of the 4 grids"),
         ({"goal": np.array([None] * 8)}, "allow_pickle=False"),
+        ({"hidden": np.zeros(4, np.bool_), "hidden.shape": np.ones((4, 2), int)}, "array 'hidden.shape' holds sizes"),
+        ({"squares.rounding": None}, "array 'squares.rounding' is missing"),
     ],
 )
 def test_arrays_that_do_not_make_scenarios_are_refused(saved, changes, found):
