@@ -18,8 +18,8 @@ from adwa_jax.window import RobotLimits
 @partial(
     jax.tree_util.register_dataclass,
     data_fields=["dt", "clearance_cap", "clearance_margin", "keypoint_tolerance", "sensor_range", "danger_clearance",
-                 "stuck_radius", "stuck_time", "static_margin", "mover_margin", "mover_growth", "mover_cap", "lookahead",
-                 "route_margin", "lost_time"],
+                 "stuck_radius", "stuck_time", "static_margin", "mover_margin", "mover_growth", "mover_cap",
+                 "lookahead", "route_margin", "lost_time"],
     meta_fields=[],
 )
 @dataclass(frozen=True)
@@ -90,15 +90,15 @@ class DwaOptions:
     horizon_steps: int = 20  # K
     normalisation: Normalisation = "sum"
     # Of the rules beyond the paper.
-    watch_steps: int = 20  # predicted steps for which movers are watched (`long_watch`); ≥ horizon_steps
+    watch_beyond: int = 0  # predicted steps beyond the horizon for which movers are watched (`long_watch`)
     stride: int = 1  # control steps in a predicted step (`ramp`)
     turn_step: int = 2  # predicted step after which a candidate changes its mind (`second_phase`)
-    halt_steps: int = 6  # control steps in which the robot comes to rest from any speed, one of them at speed (`stopping`)
+    halt_steps: int = 6  # control steps from any speed to rest, one of them at speed (`stopping`)
 
     def __post_init__(self) -> None:
         """Refuse windows without both their ends and empty horizons."""
         for name, least in (("v_samples", 2), ("yaw_rate_samples", 2), ("horizon_steps", 1), ("stride", 1),
-                            ("turn_step", 1), ("halt_steps", 1), ("watch_steps", self.horizon_steps)):
+                            ("turn_step", 1), ("halt_steps", 1), ("watch_beyond", 0)):
             require_whole(name, getattr(self, name), least)
         require_choice("normalisation", self.normalisation, ("sum", "minmax", "none"))
 

@@ -7,21 +7,30 @@ from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
-from jax import lax
 
 from adwa_jax.admissible import halts_clear, is_admissible
 from adwa_jax.constants import Constants, Options
-from adwa_jax.grid import DistanceField, Scalar, clearance_at
-from adwa_jax.obstacles import NOWHERE, Sensed, clearance_to_movers, clearance_to_squares
-from adwa_jax.prediction import Prediction, clearance_now, predict
-from adwa_jax.profiles import Profiles, constant_profiles, speed_targets, turn_targets, two_phase_profiles
-from adwa_jax.rollout import Arcs, Pose, RobotState, arcs
+from adwa_jax.grid import DistanceField, Scalar
+from adwa_jax.obstacles import Sensed
+from adwa_jax.prediction import Prediction, candidate_clearance, clearance_now, predict
+from adwa_jax.profiles import (
+    Profiles,
+    ramped_profiles,
+    speed_targets,
+    speeds_over_range,
+    turn_targets,
+    window_profiles,
+    yaw_rates_over_range,
+)
+from adwa_jax.rollout import Pose, RobotState, arcs
 from adwa_jax.route import Ahead, foot_on
 from adwa_jax.score import (
     Terms,
     clearance_term,
     forward_term,
     heading_term,
+    mean_heading_term,
+    mover_clearance_term,
     normalise,
     on_route_term,
     progress_term,
@@ -69,7 +78,7 @@ class _Judged(NamedTuple):
     clearance: jax.Array  # [V, N]
     admissible: jax.Array  # [V, N] bool
     prediction: Prediction | None  # None: the paper's arcs
-    badness: jax.Array | None  # [V, N], least for the least bad
+    badness: jax.Array  # [V, N], least for the least bad
 
 
 def decide(state: RobotState, guidance: Guidance, field: DistanceField, sensed: Sensed, constants: Constants,
@@ -81,9 +90,9 @@ def decide(state: RobotState, guidance: Guidance, field: DistanceField, sensed: 
 
     Unbatched. No NaN for finite input.
     """
-    robot, rules = constants.robot, options.rules
-    beyond = rules.ramp or rules.second_phase or rules.stopping or rules.long_watch or rules.mover_terms \
-        or rules.mover_margin or rules.reverse or len(robot.disc_offsets) > 1  # fmt: skip
+    rules = options.rules
+    beyond = any([rules.ramp, rules.second_phase, rules.reverse, rules.stopping, rules.long_watch, rules.mover_terms,
+                  rules.mover_margin, len(constants.robot.disc_offsets) > 1])  # fmt: skip
     judged = (_judged_beyond if beyond else _judged_as_printed)(state, field, sensed, constants, options)
     terms = _terms(state, judged, guidance, constants, options)
     score = weighted_sum(normalise(terms, judged.admissible, _scales(constants, options), options.dwa.normalisation),
@@ -113,7 +122,7 @@ def _judged_as_printed(state: RobotState, field: DistanceField, sensed: Sensed, 
         y=state.y + v[:, None] * arc.reach_y[-1][None, :],
         heading=jnp.broadcast_to(arc.heading[-1][None, :], clearance.shape),
     )
-    return _Judged(v, yaw_rate, end, clearance, is_admissible(clearance, v, yaw_rate, robot), None, None)
+    return _Judged(v, yaw_rate, end, clearance, is_admissible(clearance, v, yaw_rate, robot), None, -clearance)
 
 
 def _judged_beyond(state: RobotState, field: DistanceField, sensed: Sensed, constants: Constants,
@@ -121,17 +130,16 @@ def _judged_beyond(state: RobotState, field: DistanceField, sensed: Sensed, cons
     """Candidates as the rules make and judge them."""
     robot, behaviour, rules, dwa = constants.robot, constants.behaviour, options.rules, options.dwa
     profiles = candidate_profiles(state, constants, options)
-    # A robot that is nearer than its margin may go on, but not much nearer. Predictions, whose points lie farther apart,
-    # keep twice the margin, so that none promises a way on which the next steps are not admissible.
-    now = clearance_now(state, field, sensed, robot)
-    room, wider = (jnp.minimum(margin, 0.5 * now) for margin in (behaviour.static_margin, 2.0 * behaviour.static_margin))
+    # A robot nearer than its margin may go on, but not much nearer. Predictions, whose points lie farther apart, keep
+    # twice the margin, so that none promises a way on which the next steps are not admissible.
+    half_of_now = 0.5 * clearance_now(state, field, sensed, robot)
+    room = jnp.minimum(behaviour.static_margin, half_of_now)
+    wider = jnp.minimum(2.0 * behaviour.static_margin, half_of_now)
     found = predict(state, profiles, dwa.horizon_steps, _stride(options), field, sensed, robot, behaviour,
                     rules.mover_margin, wider if rules.stopping else None)
     clearance = found.static if rules.mover_terms else jnp.minimum(found.static, found.moving)
-    badness = None
     if rules.stopping:
-        halt = halts_clear(state, profiles, field, sensed, robot, behaviour, dwa.halt_steps, rules.mover_margin,
-                           room)
+        halt = halts_clear(state, profiles, field, sensed, robot, behaviour, dwa.halt_steps, rules.mover_margin, room)
         admissible = halt.clear_of_statics & (halt.moving > 0)
         badness = jnp.where(halt.clear_of_statics, -found.contact_time - 0.01 * jnp.clip(halt.moving, -1.0, 1.0),
                             1e3 - halt.static)
@@ -145,106 +153,96 @@ def _judged_beyond(state: RobotState, field: DistanceField, sensed: Sensed, cons
 def candidate_profiles(state: RobotState, constants: Constants, options: Options) -> Profiles:
     """What each candidate commands over the predicted time."""
     robot, dt, rules, dwa = constants.robot, constants.behaviour.dt, options.rules, options.dwa
-    steps = dwa.watch_steps if rules.long_watch else dwa.horizon_steps
-    if rules.ramp:
-        speeds = speed_targets(robot, dwa.v_samples, rules.second_phase, rules.reverse)
-        turns = turn_targets(robot, dwa.yaw_rate_samples, rules.second_phase)
-        return two_phase_profiles(state.v, state.yaw_rate, speeds, turns, robot, dt, steps, dwa.stride, dwa.turn_step)
-    v, yaw_rate = velocity_window(state.v, state.yaw_rate, robot, dt, dwa.v_samples, dwa.yaw_rate_samples)
-    return constant_profiles(v, yaw_rate, steps)
+    steps = _watched(options)
+    if not rules.ramp:
+        v, yaw_rate = velocity_window(state.v, state.yaw_rate, robot, dt, dwa.v_samples, dwa.yaw_rate_samples)
+        return window_profiles(v, yaw_rate, steps, dwa.turn_step, rules.second_phase)
+    held = speeds_over_range(robot, dwa.v_samples, rules.reverse)
+    speeds = speed_targets(held, jnp.float32(0.0), jnp.float32(robot.v_max), rules.second_phase)
+    turns = turn_targets(yaw_rates_over_range(robot, dwa.yaw_rate_samples), rules.second_phase)
+    return ramped_profiles(state.v, state.yaw_rate, speeds, turns, robot, dt, steps, dwa.stride, dwa.turn_step)
+
+
+def _watched(options: Options) -> int:
+    """Predicted steps in all."""
+    return options.dwa.horizon_steps + (options.dwa.watch_beyond if options.rules.long_watch else 0)
 
 
 def _stride(options: Options) -> int:
     return options.dwa.stride if options.rules.ramp else 1
 
 
-def candidate_clearance(state: RobotState, v: jax.Array, arc: Arcs, field: DistanceField, sensed: Sensed,
-                        dt: Scalar) -> jax.Array:
-    """[V, N]: least distance [m] of each candidate's K points to known squares, sensed squares and predicted movers.
-
-    Measured from the robot's centre. Points are taken one step at a time: a scan that carries the minima moves fewer
-    bytes than one [K, V, N] expression.
-    """
-
-    def body_fun(least: jax.Array, point: tuple[jax.Array, jax.Array, jax.Array]) -> tuple[jax.Array, None]:
-        reach_x, reach_y, count = point
-        x = state.x + v[:, None] * reach_x[None, :]
-        y = state.y + v[:, None] * reach_y[None, :]
-        static = jnp.minimum(clearance_at(field, x, y), clearance_to_squares(sensed, x, y))
-        moving = clearance_to_movers(sensed, x, y, count * dt)
-        return jnp.minimum(least, jnp.minimum(static, moving)), None
-
-    count = jnp.arange(1, arc.reach_x.shape[0] + 1, dtype=jnp.float32)
-    start = jnp.full((v.shape[0], arc.reach_x.shape[1]), NOWHERE, jnp.float32)
-    least, _ = lax.scan(body_fun, start, (arc.reach_x, arc.reach_y, count))
-    return least
-
-
 def brake_and_turn(state: RobotState, v: jax.Array, yaw_rate: jax.Array, local_target: jax.Array,
                    dt: Scalar) -> tuple[jax.Array, jax.Array]:
-    """The speed nearest 0 and the yaw rate nearest to facing the target after one step, both within the window."""
+    """The speed nearest 0 and the yaw rate nearest to facing the target after one step, both within the window.
+
+    v, yaw_rate: the window's samples, rising.
+    """
     turn = turn_towards(state.x, state.y, state.heading, local_target) / dt
     return jnp.clip(0.0, v[0], v[-1]), jnp.clip(turn, yaw_rate[0], yaw_rate[-1])
-
-
-def wrap(angle: jax.Array) -> jax.Array:
-    """The same angle in [−π, π) [rad]."""
-    return angle - 2.0 * jnp.pi * jnp.floor(angle / (2.0 * jnp.pi) + 0.5)
 
 
 def _otherwise(state: RobotState, judged: _Judged, guidance: Guidance, constants: Constants,
                options: Options) -> tuple[jax.Array, jax.Array]:
     """The command where no candidate is admissible."""
     robot, dt = constants.robot, constants.behaviour.dt
-    if options.rules.least_bad and judged.badness is not None:
+    if options.rules.least_bad:
         index = jnp.argmin(judged.badness)
         return judged.v[index // judged.yaw_rate.shape[0]], judged.yaw_rate[index % judged.yaw_rate.shape[0]]
-    if not options.rules.ramp:
-        return brake_and_turn(state, judged.v, judged.yaw_rate, guidance.local_target, dt)
-    limits = (robot.acceleration * dt, robot.yaw_acceleration * dt)
-    v, yaw_rate = (jnp.stack([value - reach, value + reach])
-                   for value, reach in zip((state.v, state.yaw_rate), limits, strict=True))  # fmt: skip
-    return brake_and_turn(state, v, jnp.clip(yaw_rate, -robot.yaw_rate_max, robot.yaw_rate_max),
-                          guidance.local_target, dt)
+    v, yaw_rate = velocity_window(state.v, state.yaw_rate, robot, dt, 2, 2)
+    return brake_and_turn(state, v, yaw_rate, guidance.local_target, dt)
 
 
 def _terms(state: RobotState, judged: _Judged, guidance: Guidance, constants: Constants, options: Options) -> Terms:
     rules, behaviour, end, shape = options.rules, constants.behaviour, judged.end, judged.clearance.shape
-    # A carrot is near: seen from the end of a candidate that passes it, it would lie behind.
-    begin = Pose(state.x, state.y, end.heading) if rules.carrot else end
+    # Beyond the paper a candidate may be admissible and yet end in an obstacle: no clearance, rather than less.
+    clearance = judged.clearance if judged.prediction is None else jnp.maximum(judged.clearance, 0.0)
     terms = Terms(
-        local_heading=heading_term(begin.x, begin.y, begin.heading, guidance.local_target),
-        clearance=clearance_term(judged.clearance, behaviour.clearance_cap),
+        local_heading=_local_heading(state, judged, guidance, rules.carrot),
+        clearance=clearance_term(clearance, behaviour.clearance_cap),
     )
     if rules.progress and guidance.ahead is not None:
-        now = foot_on(guidance.ahead, state.x, state.y).along
+        now = foot_on(guidance.ahead, state.x, state.y)
         foot, farthest = foot_on(guidance.ahead, end.x, end.y), _farthest(constants, options)
         along = foot.along
         if judged.prediction is not None:  # to be halfway there sooner is better: or the robot puts off what it can
             along = 0.5 * (along + foot_on(guidance.ahead, *judged.prediction.middle).along)
-        terms = terms._replace(progress=progress_term(along, now, farthest),
-                               on_route=on_route_term(foot.apart, farthest))
+        terms = terms._replace(progress=progress_term(along, now.along, farthest),
+                               on_route=on_route_term(foot.apart, now.apart, farthest))
     else:
         terms = terms._replace(
             velocity=velocity_term(judged.v, shape),
             global_heading=heading_term(end.x, end.y, end.heading, guidance.goal),
         )
     if rules.mover_terms and judged.prediction is not None:
-        found = judged.prediction
-        terms = terms._replace(contact_time=found.contact_time,
-                               mover_clearance=jnp.clip(found.moving, 0.0, behaviour.mover_cap))
+        terms = terms._replace(
+            contact_time=judged.prediction.contact_time,
+            mover_clearance=mover_clearance_term(judged.prediction.moving, behaviour.mover_cap),
+        )
     if rules.reverse:
         terms = terms._replace(forward=forward_term(judged.v, shape))
     return terms
 
 
+def _local_heading(state: RobotState, judged: _Judged, guidance: Guidance, carrot: bool) -> jax.Array:
+    if carrot and judged.prediction is not None:
+        return mean_heading_term(state, judged.prediction.headings, guidance.local_target, judged.clearance.shape)
+    end = judged.end
+    return heading_term(end.x, end.y, end.heading, guidance.local_target)
+
+
 def _scales(constants: Constants, options: Options) -> Terms:
-    """What a term is divided by under fixed scales: the most it can be."""
-    robot, behaviour, dwa = constants.robot, constants.behaviour, options.dwa
-    steps = dwa.watch_steps if options.rules.long_watch else dwa.horizon_steps
-    scales = (jnp.pi, behaviour.clearance_cap, robot.v_max, jnp.pi, _farthest(constants, options),
-              _farthest(constants, options), behaviour.dt * (steps * _stride(options)), behaviour.mover_cap, 1.0)  # fmt: skip
-    return Terms(*map(jnp.float32, scales))
+    """What a term is divided by under fixed scales: the most it can be, or its half-range."""
+    robot, behaviour = constants.robot, constants.behaviour
+    steps = _watched(options)
+    farthest = _farthest(constants, options)
+    scales = {
+        "local_heading": jnp.pi, "clearance": behaviour.clearance_cap, "velocity": robot.v_max,
+        "global_heading": jnp.pi, "progress": farthest, "on_route": farthest,
+        "contact_time": behaviour.dt * (steps * _stride(options)), "mover_clearance": behaviour.mover_cap,
+        "forward": 1.0,
+    }  # fmt: skip
+    return Terms(**{name: jnp.float32(scale) for name, scale in scales.items()})
 
 
 def _farthest(constants: Constants, options: Options) -> Scalar:

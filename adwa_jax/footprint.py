@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from functools import reduce
 
 import jax
 import jax.numpy as jnp
@@ -26,8 +27,5 @@ def over_discs(clearance: Callable[[jax.Array, jax.Array], jax.Array], robot: Ro
     """The least `clearance` of points over the discs' centres, less their radius. Shapes of x, y, cosine, sine fit."""
     if len(robot.disc_offsets) == 1:  # a disc turns on the spot
         return clearance(x, y) - robot.radius
-    least = None
-    for offset in robot.disc_offsets:
-        here = clearance(x + offset * cosine, y + offset * sine)
-        least = here if least is None else jnp.minimum(least, here)
-    return least - robot.radius  # pyright: ignore[reportOptionalOperand]
+    over = [clearance(x + offset * cosine, y + offset * sine) for offset in robot.disc_offsets]
+    return reduce(jnp.minimum, over) - robot.radius

@@ -13,12 +13,14 @@ from jax import lax
 
 from adwa_jax.astar import Status, search
 from adwa_jax.constants import Constants, Options
-from adwa_jax.grid import DistanceField, Grid, cell_of, centre_of, inflate
+from adwa_jax.grid import DistanceField, Grid, Scalar, cell_of, centre_of, inflate
 from adwa_jax.heuristic_weight import weight_field
 from adwa_jax.keypoints import key_points, segment_free
 from adwa_jax.plan import Plan
 from adwa_jax.route import Route, route_through
 from adwa_jax.scenario import Scenario, UnknownSquares
+
+TOUCHING = 1e-4  # [cells] overlaps no deeper than this are none
 
 
 class Memory(NamedTuple):
@@ -56,7 +58,7 @@ def field_of(memory: Memory, plan: Plan) -> DistanceField:
     return replace(plan.field, distance=memory.distance) if memory.distance.size else plan.field
 
 
-def in_range(scenario: Scenario, position: jax.Array, sensor_range: jax.Array) -> jax.Array:
+def in_range(scenario: Scenario, position: jax.Array, sensor_range: Scalar) -> jax.Array:
     """[H, W] bool: hidden cells whose square is within range of a point [2] [m]."""
     grid = scenario.grid
     rows, columns = scenario.hidden.shape
@@ -73,6 +75,7 @@ def learn(memory: Memory, position: jax.Array, target: jax.Array, known: jax.Arr
 
     Unbatched. target: [] int32, the route point now headed for; known: [S] bool, squares sensed.
     """
+    memory = memory._replace(target=target)
     if scenario.hidden.size:
         now = in_range(scenario, position, constants.behaviour.sensor_range)
         distance = lax.cond(jnp.any(now & ~memory.seen), lambda: _with_cells(memory, now & ~memory.seen, scenario.grid),
@@ -83,7 +86,7 @@ def learn(memory: Memory, position: jax.Array, target: jax.Array, known: jax.Arr
     grid = known_grid(scenario, memory.seen, known)
     blocked = lost | route_blocked(memory.route, target, grid, constants)
     return lax.cond(blocked, lambda: _with_new_route(memory, position, grid, scenario, constants, options),
-                    lambda: memory._replace(target=target))  # fmt: skip
+                    lambda: memory)  # fmt: skip
 
 
 def known_grid(scenario: Scenario, seen: jax.Array, known: jax.Array) -> Grid:
@@ -100,10 +103,13 @@ def overlapped(grid: Grid, squares: UnknownSquares, known: jax.Array) -> jax.Arr
     y = (squares.centre[:, 1] - grid.origin[1]) / grid.resolution
     half = squares.half_width / grid.resolution
     reach = squares.rounding / grid.resolution
-    dx = jnp.maximum(_gap(x[:, None], jnp.arange(columns, dtype=jnp.float32)[None, :]) - half[:, None], 0.0)
-    dy = jnp.maximum(_gap(y[:, None], jnp.arange(rows, dtype=jnp.float32)[None, :]) - half[:, None], 0.0)
-    apart = jnp.sqrt((dy * dy)[:, :, None] + (dx * dx)[:, None, :])
-    return jnp.any(known[:, None, None] & (apart < (reach + 1e-4)[:, None, None]), axis=0)
+    dx = _gap(x[:, None], jnp.arange(columns, dtype=jnp.float32)[None, :])
+    dy = _gap(y[:, None], jnp.arange(rows, dtype=jnp.float32)[None, :])
+    half, reach = half[:, None], reach[:, None, None]
+    sharp = (dy < half - TOUCHING)[:, :, None] & (dx < half - TOUCHING)[:, None, :]
+    beyond_x, beyond_y = jnp.maximum(dx - half, 0.0), jnp.maximum(dy - half, 0.0)
+    apart = jnp.sqrt((beyond_y * beyond_y)[:, :, None] + (beyond_x * beyond_x)[:, None, :])
+    return jnp.any(known[:, None, None] & (sharp | (apart < reach - TOUCHING)), axis=0)
 
 
 def route_blocked(route: Route, target: jax.Array, grid: Grid, constants: Constants) -> jax.Array:

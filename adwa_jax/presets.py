@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 from adwa_jax.astar import SearchOptions
 from adwa_jax.constants import Behaviour, Constants, DwaOptions, Options, PlanOptions
-from adwa_jax.constants import DwaOptions
 from adwa_jax.footprint import covering_discs
 from adwa_jax.heuristic_weight import WeightRule
 from adwa_jax.rules import EVERY_RULE, Rules
@@ -71,22 +70,25 @@ def preset(rules: Rules) -> Preset:
     constants, options = base.constants, base.options
     weights, behaviour, robot, dwa = constants.weights, constants.behaviour, constants.robot, options.dwa
     if rules.ramp:
-        dwa = replace(dwa, v_samples=6, yaw_rate_samples=9, horizon_steps=8, stride=2, turn_step=2, watch_steps=8)
+        dwa = replace(dwa, v_samples=6, yaw_rate_samples=9, horizon_steps=8, stride=2, turn_step=2)
     if rules.long_watch:
-        dwa = replace(dwa, watch_steps=12 if rules.ramp else 30)
+        dwa = replace(dwa, watch_beyond=8 if rules.ramp else 10)
     if rules.fixed_scale:
         dwa = replace(dwa, normalisation="none")
     if rules.reverse:
-        robot = replace(robot, v_min=-0.4)
-        weights = replace(weights, forward=0.1)
+        robot = replace(robot, v_min=-0.5)
+        weights = replace(weights, forward=0.03)
     if rules.stopping:
-        behaviour = replace(behaviour, static_margin=0.02)
+        behaviour = replace(behaviour, static_margin=0.02, clearance_cap=0.36)
     if rules.progress:
-        weights = replace(weights, local_heading=0.2, clearance=0.1, progress=2.0, on_route=0.5)
+        weights = replace(weights, local_heading=0.53, clearance=0.1, progress=0.65, on_route=0.43)
     if rules.mover_terms:
-        weights = replace(weights, contact_time=1.5, mover_clearance=0.3)
+        weights = replace(weights, contact_time=1.9, mover_clearance=0.4)
+        behaviour = replace(behaviour, mover_cap=1.2)
     if rules.mover_margin:
-        behaviour = replace(behaviour, mover_margin=0.08, mover_growth=0.03)
+        behaviour = replace(behaviour, mover_margin=0.1, mover_growth=0.01)
+    if rules.carrot:
+        behaviour = replace(behaviour, lookahead=6.0)
     if rules.replan:
         behaviour = replace(behaviour, clearance_margin=0.35, route_margin=0.05)
     plan = replace(options.plan, subdivision=10) if rules.fine_field else options.plan

@@ -29,14 +29,17 @@ class Targets(NamedTuple):
     second: jax.Array  # [A] float32
 
 
-def constant_profiles(v: jax.Array, yaw_rate: jax.Array, steps: int) -> Profiles:
-    """The window's velocities (eq. 6), held over `steps` predicted steps. v: [V], yaw_rate: [N]."""
-    return Profiles(v, yaw_rate, jnp.broadcast_to(v, (steps, *v.shape)),
-                    jnp.broadcast_to(yaw_rate, (steps, *yaw_rate.shape)))
+def window_profiles(v: jax.Array, yaw_rate: jax.Array, steps: int, turn_step: int, second_phase: bool) -> Profiles:
+    """The window's velocities (eq. 6), held over `steps` predicted steps, changed at once. v: [V], yaw_rate: [N]."""
+    speeds = speed_targets(v, jnp.clip(0.0, v[0], v[-1]), v[-1], second_phase)
+    turns = turn_targets(yaw_rate, second_phase)
+    early = (jnp.arange(steps) < turn_step)[:, None]
+    return Profiles(speeds.first, turns.first, jnp.where(early, speeds.first[None, :], speeds.second[None, :]),
+                    jnp.where(early, turns.first[None, :], turns.second[None, :]))
 
 
-def two_phase_profiles(v: jax.Array, yaw_rate: jax.Array, speeds: Targets, turns: Targets, robot: RobotLimits,
-                       dt: Scalar, steps: int, stride: int, turn_step: int) -> Profiles:
+def ramped_profiles(v: jax.Array, yaw_rate: jax.Array, speeds: Targets, turns: Targets, robot: RobotLimits,
+                    dt: Scalar, steps: int, stride: int, turn_step: int) -> Profiles:
     """Targets approached from the present velocities within the acceleration limits (`rules.ramp`).
 
     v [m/s], yaw_rate [rad/s], dt [s]: []; speeds of V targets, turns of N.
@@ -49,36 +52,41 @@ def two_phase_profiles(v: jax.Array, yaw_rate: jax.Array, speeds: Targets, turns
     )
 
 
-def speed_targets(robot: RobotLimits, samples: int, second_phase: bool, reverse: bool) -> Targets:
-    """Speeds [m/s]: `samples` from 0 to v_max, held; with a second phase also full speed then halt, and halt then full
-    speed; with `reverse` also v_min, held.
-    """
+def speeds_over_range(robot: RobotLimits, samples: int, reverse: bool) -> jax.Array:
+    """Speeds [m/s]: `samples` from 0 to v_max; with `reverse` also v_min, as the last."""
     share = jnp.arange(samples, dtype=jnp.float32) / (samples - 1)
-    full, halt, back = (jnp.full((1,), speed, jnp.float32) for speed in (robot.v_max, 0.0, robot.v_min))
-    first, second = [share * robot.v_max], [share * robot.v_max]
-    if second_phase:
-        first, second = [*first, full, halt], [*second, halt, full]
-    if reverse:
-        first, second = [*first, back], [*second, back]
-    return Targets(jnp.concatenate(first), jnp.concatenate(second))
+    back = [jnp.full((1,), robot.v_min, jnp.float32)] if reverse else []
+    return jnp.concatenate([share * robot.v_max, *back])
 
 
-def turn_targets(robot: RobotLimits, samples: int, second_phase: bool) -> Targets:
-    """Yaw rates [rad/s]: `samples` (odd: one is 0) over the whole range, held; with a second phase each but 0 also
-    followed by straight on, and by the other way.
-    """
-    half = samples // 2
-    share = jnp.arange(-half, half + 1, dtype=jnp.float32) / half
-    held = share * robot.yaw_rate_max
+def yaw_rates_over_range(robot: RobotLimits, samples: int) -> jax.Array:
+    """[N] yaw rates [rad/s] over the whole range; an odd number of `samples` makes the middle one 0."""
+    share = jnp.arange(samples, dtype=jnp.float32) * (2.0 / (samples - 1)) - 1.0
+    return share * robot.yaw_rate_max
+
+
+def speed_targets(held: jax.Array, halt: jax.Array, full: jax.Array, second_phase: bool) -> Targets:
+    """Speeds [A] held; with a second phase also `full` speed, [], then `halt`, [], and the other way round. [m/s]."""
     if not second_phase:
         return Targets(held, held)
+    full_halt = jnp.stack([full, halt])
+    return Targets(jnp.concatenate([held, full_halt]), jnp.concatenate([held, full_halt[::-1]]))
+
+
+def turn_targets(held: jax.Array, second_phase: bool) -> Targets:
+    """Yaw rates [A] held; with a second phase each but the middle one also followed by straight on, and by the other
+    way. [rad/s].
+    """
+    if not second_phase:
+        return Targets(held, held)
+    half = held.shape[0] // 2
     turning = jnp.concatenate([held[:half], held[half + 1 :]])
     return Targets(jnp.concatenate([held, turning, turning]),
                    jnp.concatenate([held, jnp.zeros_like(turning), -turning]))
 
 
 def halting_profiles(v: jax.Array, yaw_rate: jax.Array, robot: RobotLimits, dt: Scalar, steps: int) -> Profiles:
-    """One control step of each command, then braking to a halt within the acceleration limits. v: [V], yaw_rate: [N]."""
+    """One control step of each command, [V] and [N], then braking to a halt within the acceleration limits."""
     later = jnp.arange(steps, dtype=jnp.float32)[:, None] * dt
     v_row, yaw_row = v[None, :], yaw_rate[None, :]
     return Profiles(v, yaw_rate, approached(v_row, jnp.zeros_like(v_row), robot.acceleration * later),
@@ -90,7 +98,7 @@ def approached(value: jax.Array, target: jax.Array, reach: Scalar) -> jax.Array:
     return value + jnp.clip(target - value, -reach, reach)
 
 
-def _ramp(value: jax.Array, targets: Targets, reach: jax.Array, steps: int, stride: int, turn_step: int) -> jax.Array:
+def _ramp(value: jax.Array, targets: Targets, reach: Scalar, steps: int, stride: int, turn_step: int) -> jax.Array:
     """[K, A]: the mean velocity during each predicted step; reach: [] what one control step can change."""
     step = jnp.arange(1, steps + 1, dtype=jnp.float32)[:, None]
     lag = (stride - 1) / 2  # a predicted step stands for `stride` control steps, on average that much earlier

@@ -43,6 +43,11 @@ def euler_step(pose: Pose, v: jax.Array, yaw_rate: jax.Array, dt: Scalar) -> Pos
     )
 
 
+def wrap(angle: jax.Array) -> jax.Array:
+    """The same angle in [−π, π) [rad]."""
+    return angle - 2.0 * jnp.pi * jnp.floor(angle / (2.0 * jnp.pi) + 0.5)
+
+
 def arcs(heading: jax.Array, yaw_rate: jax.Array, dt: Scalar, steps: int) -> Arcs:
     """The K = `steps` points after each Euler step (eq. 7) for N yaw rates, per unit of speed.
 

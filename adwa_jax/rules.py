@@ -10,7 +10,7 @@ from adwa_jax.checks import require
 @jax.tree_util.register_static
 @dataclass(frozen=True)
 class Rules:
-    """Which of the extended planner's rules hold. All off is the paper's method; `preset` finds constants for any mix."""
+    """Which rules hold. All off is the paper's method; `presets.preset` has constants for any mix."""
 
     # Candidates are targets over the whole range of velocities, approached within the acceleration limits as they are
     # predicted (trajectory rollout: Gerkey and Konolige 2008). Off: constant velocities of the window (eq. 6).

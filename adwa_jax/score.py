@@ -12,6 +12,7 @@ import jax.numpy as jnp
 
 from adwa_jax.checks import require_numbers
 from adwa_jax.grid import Scalar
+from adwa_jax.rollout import RobotState, wrap
 
 Normalisation = Literal["sum", "minmax", "none"]
 
@@ -64,6 +65,19 @@ def heading_term(x: jax.Array, y: jax.Array, heading: jax.Array, target: jax.Arr
     return jnp.pi - jnp.abs(turn_towards(x, y, heading, target))
 
 
+def mean_heading_term(state: RobotState, headings: jax.Array, target: jax.Array, shape: tuple[int, ...]) -> jax.Array:
+    """π − |angle between a predicted heading and the bearing robot → target|, on average over the prediction.
+
+    The bearing is taken from where the robot is, as the target is near: from the end of a candidate that passes it, it
+    would lie behind. The average is taken, as a robot judged by its last heading alone puts off turning.
+
+    headings: [K, N] [rad]; target: [2] [m]; shape (V, N).
+    """
+    bearing = state.heading + turn_towards(state.x, state.y, state.heading, target)
+    off = jnp.abs(wrap(headings - bearing))
+    return jnp.broadcast_to(jnp.pi - jnp.mean(off, axis=0)[None, :], shape)
+
+
 def turn_towards(x: jax.Array, y: jax.Array, heading: jax.Array, target: jax.Array) -> jax.Array:
     """Angle in [−π, π] from the heading to the bearing of the target [rad], anticlockwise positive.
 
@@ -93,11 +107,17 @@ def progress_term(along: jax.Array, now: jax.Array, farthest: Scalar) -> jax.Arr
     return jnp.clip(along - now + farthest, 0.0, 2.0 * farthest)
 
 
-def on_route_term(squared: jax.Array, farthest: Scalar) -> jax.Array:
-    """How much nearer than `farthest` [m] to the route the candidate ends, ≥ 0; squared: its distance² [m²]."""
-    positive = squared > 0
-    apart = jnp.where(positive, jnp.sqrt(jnp.where(positive, squared, 1.0)), 0.0)
-    return jnp.maximum(farthest - apart, 0.0)
+def on_route_term(squared: jax.Array, now: jax.Array, farthest: Scalar) -> jax.Array:
+    """How much nearer to the route the candidate ends than the robot is [m], plus `farthest`: in [0, 2 · farthest].
+
+    squared, now: distance² of the ends and of the robot [m²].
+    """
+    return jnp.clip(_root(now) - _root(squared) + farthest, 0.0, 2.0 * farthest)
+
+
+def mover_clearance_term(clearance: jax.Array, cap: Scalar) -> jax.Array:
+    """The candidate's least clearance to predicted movers [m], in [0, `cap`]."""
+    return jnp.clip(clearance, 0.0, cap)
 
 
 def forward_term(v: jax.Array, shape: tuple[int, ...]) -> jax.Array:
@@ -110,10 +130,12 @@ def normalise(terms: Terms, admissible: jax.Array, scales: Terms, normalisation:
 
     A term whose sum or range is 0 says nothing and becomes 0. admissible: [V, N] bool; scales: [] each, for `none`.
     """
-    if normalisation == "none":
-        return Terms(*(None if term is None else term / scale for term, scale in zip(terms, scales, strict=True)))
-    over = _over_range if normalisation == "minmax" else _over_sum
-    return Terms(*(None if term is None else over(term, admissible) for term in terms))
+    def normalised(name: str) -> jax.Array:
+        if normalisation == "none":
+            return getattr(terms, name) / getattr(scales, name)
+        return (_over_range if normalisation == "minmax" else _over_sum)(getattr(terms, name), admissible)
+
+    return Terms(**{name: normalised(name) for name in Terms._fields if getattr(terms, name) is not None})
 
 
 def weighted_sum(terms: Terms, weights: ScoreWeights) -> jax.Array:
@@ -136,3 +158,8 @@ def _over_range(term: jax.Array, admissible: jax.Array) -> jax.Array:
     span = jnp.max(jnp.where(admissible, term, -jnp.inf)) - least
     distinct = jnp.isfinite(span) & (span > 1e-12)
     return jnp.where(distinct, (term - jnp.where(distinct, least, 0.0)) / jnp.where(distinct, span, 1.0), 0.0)
+
+
+def _root(squared: jax.Array) -> jax.Array:
+    positive = squared > 0
+    return jnp.where(positive, jnp.sqrt(jnp.where(positive, squared, 1.0)), 0.0)

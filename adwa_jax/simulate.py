@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from enum import IntEnum
+from functools import partial
 from typing import NamedTuple
 
 import jax
@@ -11,7 +12,7 @@ from jax import lax
 
 from adwa_jax.astar import Status
 from adwa_jax.constants import Constants, Options
-from adwa_jax.dwa import Decision, Guidance, decide, wrap
+from adwa_jax.dwa import Decision, Guidance, decide
 from adwa_jax.footprint import over_discs
 from adwa_jax.grid import DistanceField, Scalar, clearance_at, distance_to_squares
 from adwa_jax.learn import Memory, field_of, first_memory, in_range, learn, learns
@@ -19,7 +20,7 @@ from adwa_jax.metrics import Measures, Running, Step, finish_measures, measure_s
 from adwa_jax.obstacles import MoverStates, Sensed, clearance_to_movers, clearance_to_squares, movers_at, sense
 from adwa_jax.plan import Plan
 from adwa_jax.prediction import static_clearance
-from adwa_jax.rollout import Pose, RobotState, euler_step
+from adwa_jax.rollout import Pose, RobotState, euler_step, wrap
 from adwa_jax.route import Route, ahead_of, carrot, foot_on
 from adwa_jax.scenario import Scenario
 from adwa_jax.score import turn_towards
@@ -92,7 +93,8 @@ def drive(scenario: Scenario, plan: Plan, constants: Constants, options: Options
     def body_fun(carry: tuple[EpisodeState, Memory]) -> tuple[EpisodeState, Memory]:
         state, memory = carry
         if learns(scenario, options):
-            state, memory = lax.cond(state.noticed, lambda: take_in(*carry, scenario, constants, options), lambda: carry)
+            state, memory = lax.cond(state.noticed, lambda: take_in(state, memory, scenario, constants, options),
+                                     lambda: (state, memory))  # fmt: skip
         return control_step(state, memory, scenario, plan, constants, options)[0], memory
 
     begin = start_episode(scenario, plan), first_memory(scenario, plan)
@@ -116,7 +118,7 @@ def drive_lanes(scenarios: Scenario, plans: Plan, constants: Constants, options:
 
     begin = jax.vmap(start_episode)(scenarios, plans), jax.vmap(first_memory)(scenarios, plans)
     state, memory = lax.while_loop(cond_fun, body_fun, begin)
-    return jax.vmap(lambda *lane: finish_episode(*lane, constants))(state, memory, scenarios, plans)
+    return jax.vmap(partial(finish_episode, constants=constants))(state, memory, scenarios, plans)
 
 
 def trace(scenario: Scenario, plan: Plan, constants: Constants, options: Options, steps: int) -> tuple[Episode, Trace]:
@@ -131,13 +133,15 @@ def trace(scenario: Scenario, plan: Plan, constants: Constants, options: Options
         state, memory = lanes_step(*carry, scenarios, plans, constants, options)
         lane = jax.tree.map(lambda leaf: leaf[0], state)
         movers = movers_at(scenario.movers, lane.step.astype(jnp.float32) * dt)
-        return (state, memory), (lane.robot, movers, lane.known, lane.target_point, lane.measured.last.clearance)
+        row = (lane.robot, movers, lane.known, lane.target_point, lane.measured.last.clearance)
+        return (state, memory), row
 
     begin = jax.vmap(start_episode)(scenarios, plans), jax.vmap(first_memory)(scenarios, plans)
     (state, memory), rows = lax.scan(body_fun, begin, None, length=steps)
-    episode = jax.vmap(lambda *lane: finish_episode(*lane, constants))(state, memory, scenarios, plans)
+    episode = jax.vmap(partial(finish_episode, constants=constants))(state, memory, scenarios, plans)
     episode, memory, length = jax.tree.map(lambda leaf: leaf[0], (episode, memory, state.step))
-    return episode, Trace(*rows, length, memory.route, memory.seen)
+    robot, movers, known, target, clearance = rows
+    return episode, Trace(robot, movers, known, target, clearance, length, memory.route, memory.seen)
 
 
 def lanes_step(state: EpisodeState, memory: Memory, scenarios: Scenario, plans: Plan, constants: Constants,
@@ -260,7 +264,7 @@ def notices(state: EpisodeState, memory: Memory, scenario: Scenario, constants: 
 
 def next_target(target: jax.Array, position: jax.Array, points: jax.Array, count: jax.Array,
                 tolerance: Scalar) -> jax.Array:
-    """[] int32: the next key point not yet within `tolerance`; the last stays (§4 B). points: [P, 2], `count` in use."""
+    """[] int32: the next point not yet within `tolerance`; the last stays (§4 B). points: [P, 2], `count` in use."""
 
     def cond_fun(index: jax.Array) -> jax.Array:
         offset = points[index] - position
@@ -307,8 +311,7 @@ def clearances(state: EpisodeState, scenario: Scenario, field: DistanceField, co
                options: Options) -> tuple[jax.Array, jax.Array, jax.Array]:
     """True clearance [m] from the robot's outline to known squares, to all that is unknown and static, and to movers.
 
-    Squares of the map, hidden ones too: exact within the contact window, beyond it the field's lower bound for what is
-    known.
+    Squares of the map, hidden ones too: exact within the contact window, beyond it a lower bound.
     """
     robot = state.robot
     now = movers_at(scenario.movers, state.step.astype(jnp.float32) * constants.behaviour.dt)
@@ -317,7 +320,8 @@ def clearances(state: EpisodeState, scenario: Scenario, field: DistanceField, co
 
     def known(x: jax.Array, y: jax.Array) -> jax.Array:
         exact = distance_to_squares(scenario.grid, jnp.stack([x, y]), options.contact_reach)
-        return jnp.where(jnp.isfinite(exact), exact, clearance_at(field, x, y))
+        farther = jnp.maximum(clearance_at(field, x, y), options.contact_reach * scenario.grid.resolution)
+        return jnp.where(jnp.isfinite(exact), exact, farther)
 
     def unknown(x: jax.Array, y: jax.Array) -> jax.Array:
         to_squares = clearance_to_squares(everything, x, y)
@@ -329,8 +333,9 @@ def clearances(state: EpisodeState, scenario: Scenario, field: DistanceField, co
     def moving(x: jax.Array, y: jax.Array) -> jax.Array:
         return clearance_to_movers(everything, x, y, jnp.float32(0.0))
 
-    heading = (jnp.cos(robot.heading), jnp.sin(robot.heading)) if len(constants.robot.disc_offsets) > 1 else (0.0, 0.0)
-    return tuple(over_discs(kind, constants.robot, robot.x, robot.y, *heading) for kind in (known, unknown, moving))
+    pose = robot.x, robot.y, jnp.cos(robot.heading), jnp.sin(robot.heading)
+    outline = constants.robot
+    return over_discs(known, outline, *pose), over_discs(unknown, outline, *pose), over_discs(moving, outline, *pose)
 
 
 def finish_episode(state: EpisodeState, memory: Memory, scenario: Scenario, plan: Plan,

@@ -38,6 +38,8 @@ class RobotLimits:
         for name in ("v_max", "yaw_rate_max", "acceleration", "yaw_acceleration", "brake", "yaw_brake"):
             value = getattr(self, name)
             require(value > 0, name, float(value), "must be positive", "set it in SI units")
+        require(len(self.disc_offsets) > 1 or self.disc_offsets == (0.0,), "disc_offsets", self.disc_offsets,
+                "a single disc is centred on the robot", "set it to (0.0,)")
         require(self.v_min <= self.v_max, "v_min", float(self.v_min), f"must not exceed v_max = {self.v_max:g}",
                 "lower it")
 

@@ -9,6 +9,7 @@ import numpy as np
 from adwa_jax.plan import Plan
 from adwa_jax.scenario import Scenario
 from adwa_jax.simulate import Episode, Outcome, Trace
+from adwa_jax.window import RobotLimits
 from scenarios.drawing import (
     BLACK,
     BLUE,
@@ -17,6 +18,7 @@ from scenarios.drawing import (
     GREEN,
     OCCUPIED,
     ORANGE,
+    PURPLE,
     SKY,
     VERMILLION,
     draw_ends,
@@ -26,7 +28,18 @@ from scenarios.drawing import (
     new_figure,
 )
 from scenarios.errors import InputError
-from tuning.figures import COLLISIONS, SENTENCES, draw_polyline, driven_path, driven_ways, prefixed
+from tuning.figures import (
+    COLLISIONS,
+    SENTENCES,
+    disc_centres,
+    draw_hidden_cells,
+    draw_last_route,
+    draw_outline,
+    draw_polyline,
+    driven_path,
+    driven_ways,
+    prefixed,
+)
 
 MOST_FRAMES = 150
 FRAME_RATE = 12.0  # pictures a second, at most
@@ -37,17 +50,19 @@ Progress = Callable[[int, int], None]  # (pictures done, of how many)
 
 
 def animate_drive(path: Path, scenario: Scenario, plan: Plan, episode: Episode, trace: Trace, title: str = "",
-                  y_down: bool = False, robot_radius: float | None = None, speed: float = 4.0,
+                  y_down: bool = False, robot: RobotLimits | None = None, speed: float = 4.0,
                   progress: Progress | None = None) -> Path:
     """Write the drive to a .gif, or to an .mp4 where ffmpeg is installed; returns the path. Unbatched.
 
     At most `MOST_FRAMES` pictures, `speed` times as fast as it was driven, the last one held. Squares fill when they
-    are sensed; a line shows each mover's way in the next second; a ring is the local target. robot_radius [m]: draws
-    the robot to scale. Raises InputError (a ValueError) for another suffix, and for .mp4 without ffmpeg.
+    are sensed, hidden cells are filled throughout where the drive saw them; a line shows each mover's way in the next
+    second; a ring is the local target; the last route is there from the beginning. robot: drawn to scale. Raises
+    InputError (a ValueError) as `check_writer`.
     """
     path = Path(path)
-    write = _writer(path)
-    film = _Film(scenario, plan, episode, trace, title, y_down, robot_radius)
+    check_writer(path)
+    write = _write_gif if path.suffix.lower() == ".gif" else _write_mp4
+    film = _Film(scenario, plan, episode, trace, title, y_down, robot)
     seconds = max(film.dt * film.steps, film.dt) / speed
     count = min(int(np.ceil(seconds * FRAME_RATE)), MOST_FRAMES, film.steps + 1)
     moments = np.unique(np.linspace(0, film.steps, max(count, 1)).round().astype(int)).tolist()
@@ -59,28 +74,31 @@ class _Film:
     """One picture, redrawn for each moment. Moment k is after k control steps."""
 
     def __init__(self, scenario: Scenario, plan: Plan, episode: Episode, trace: Trace, title: str, y_down: bool,
-                 robot_radius: float | None):
+                 robot: RobotLimits | None):
         self.steps = int(trace.length)
         self.path, self.ways = driven_path(scenario, trace), driven_ways(scenario, trace)
         self.trace, self.valid = trace, np.asarray(scenario.squares.valid)
         self.dt = float(episode.measures.time) / self.steps if self.steps else 0.1
         self.outcome, self.title = Outcome(int(episode.outcome)), prefixed(title)
+        self.start_heading = float(np.asarray(scenario.start)[2])
         self.figure = new_figure(map_size(scenario.grid, legend=0.0))
         self.ax = draw_map(scenario.grid, self.figure.subplots(), y_down)
-        self._draw_fixed(scenario, plan)
-        self._draw_moving(scenario, robot_radius)
+        self._draw_fixed(scenario, plan, episode)
+        self._draw_moving(scenario, robot)
         self.show(0)
         self.figure.canvas.draw()
         self.figure.set_layout_engine("none")  # laid out once, or the map would tremble
 
-    def _draw_fixed(self, scenario: Scenario, plan: Plan) -> None:
+    def _draw_fixed(self, scenario: Scenario, plan: Plan, episode: Episode) -> None:
+        draw_hidden_cells(scenario, self.trace, self.ax)
+        draw_last_route(episode, self.trace, self.ax)
         draw_ends(scenario.start[:2], scenario.goal, self.ax)
         key_points = np.asarray(plan.key_points)[: int(plan.key_point_count)]
         if len(key_points):
             draw_polyline(key_points, self.ax, "--", "planned path")
         self.squares = draw_squares(scenario.squares, self.ax)
 
-    def _draw_moving(self, scenario: Scenario, robot_radius: float | None) -> None:
+    def _draw_moving(self, scenario: Scenario, robot: RobotLimits | None) -> None:
         from matplotlib.patches import Circle
 
         ax = self.ax
@@ -91,10 +109,11 @@ class _Film:
         (self.driven,) = ax.plot([], [], color=VERMILLION, linewidth=2.0, zorder=6)
         (self.target,) = ax.plot([], [], linestyle="none", marker="o", markersize=12, markerfacecolor="none",
                                  markeredgecolor=BLACK, zorder=7)
-        self.size = robot_radius or 0.012 * max(np.ptp(ax.get_xlim()), np.ptp(ax.get_ylim()))
-        self.robot = Circle((0, 0), self.size, facecolor=VERMILLION, zorder=9, **style)
-        for disc in (*self.movers, self.robot):
+        for disc in self.movers:
             ax.add_patch(disc)
+        self.radius = float(robot.radius) if robot else 0.012 * max(np.ptp(ax.get_xlim()), np.ptp(ax.get_ylim()))
+        self.offsets = robot.disc_offsets if robot else (0.0,)
+        self.robot = draw_outline(np.zeros((len(self.offsets), 2)), self.radius, ax, facecolor=VERMILLION, **style)
         (self.nose,) = ax.plot([], [], color=BLACK, linewidth=1.5, zorder=9.1)
         (self.crash,) = ax.plot([], [], linestyle="none", marker="X", markersize=13, markerfacecolor=VERMILLION,
                                 markeredgecolor=BLACK, zorder=10)
@@ -105,7 +124,7 @@ class _Film:
         self._show_squares(moment)
         self._show_movers(moment)
         self.driven.set_data(*self.path[: moment + 1].T)
-        self._show_robot(self.path[moment], float(np.asarray(self.trace.robot.heading)[row]) if moment else None)
+        self._show_robot(self.path[moment], self._heading(moment))
         self.target.set_data(*(np.asarray(self.trace.target)[row][:, None] if moment else ([], [])))
         ended = moment == self.steps
         self.crash.set_data(*(self.path[-1][:, None] if ended and self.outcome in COLLISIONS else ([], [])))
@@ -128,14 +147,20 @@ class _Film:
                 disc.set_center(tuple(centre))
             line.set_data(*self.ways[moment : last + 1, index].T)
 
-    def _show_robot(self, position: np.ndarray, heading: float | None) -> None:
-        self.robot.set_center(tuple(position))
-        if heading is not None:
-            tip = position + 1.6 * self.size * np.array([np.cos(heading), np.sin(heading)])
-            self.nose.set_data(*np.stack([position, tip]).T)
+    def _show_robot(self, position: np.ndarray, heading: float) -> None:
+        for disc, centre in zip(self.robot, disc_centres(position, heading, self.offsets), strict=True):
+            disc.set_center(tuple(centre))
+        reach = max(self.offsets) + 1.6 * self.radius
+        tip = position + reach * np.array([np.cos(heading), np.sin(heading)])
+        self.nose.set_data(*np.stack([position, tip]).T)
+
+    def _heading(self, moment: int) -> float:
+        """That of the start is not kept: the one a step later stands for it."""
+        return float(np.asarray(self.trace.robot.heading)[max(moment - 1, 0)]) if self.steps else self.start_heading
 
 
-def _writer(path: Path) -> Callable[..., None]:
+def check_writer(path: Path) -> None:
+    """Raises InputError unless an animation can be written to such a file: .gif, or .mp4 where ffmpeg is installed."""
     from matplotlib.animation import FFMpegWriter
 
     suffix = path.suffix.lower()
@@ -143,7 +168,6 @@ def _writer(path: Path) -> Callable[..., None]:
         raise InputError(f"{path}: suffix {suffix!r}; an animation is a .gif or an .mp4; rename it")
     if suffix == ".mp4" and not FFMpegWriter.isAvailable():
         raise InputError(f"{path}: .mp4 is written by ffmpeg, which is not on the PATH; install it or write a .gif")
-    return _write_gif if suffix == ".gif" else _write_mp4
 
 
 def _write_gif(path: Path, film: _Film, moments: list[int], rate: float, progress: Progress) -> None:
@@ -165,7 +189,7 @@ def _palette() -> list[int]:
     """R, G, B of the colours drawn with, of greys, and of blends with white and black for smooth edges."""
     from matplotlib.colors import to_rgb
 
-    colours = [to_rgb(colour) for colour in (ORANGE, SKY, GREEN, BLUE, VERMILLION)]
+    colours = [to_rgb(colour) for colour in (ORANGE, SKY, GREEN, BLUE, VERMILLION, PURPLE)]
     blends = [share * np.array(colour) + (1 - share) * ground
               for colour in colours for ground in (0.0, 1.0) for share in (1.0, 0.75, 0.5, 0.25)]  # fmt: skip
     greys = [np.full(3, level) for level in np.linspace(0, 1, 24)]

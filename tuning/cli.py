@@ -1,4 +1,4 @@
-"""The command `adwa`: plan, evaluate, drive, suite make, suite show, demo.
+"""The command `adwa`: plan, evaluate, ablate, drive, suite make, suite show, demo.
 
 Exit code 0: done; 1: ran, but found nothing; 2: bad input, said in one line.
 """
@@ -9,6 +9,7 @@ import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
@@ -18,17 +19,45 @@ import numpy as np
 import typer
 
 from adwa_jax.astar import Status
-from adwa_jax.presets import PRESETS, Preset
+from adwa_jax.presets import Preset
+from adwa_jax.rules import RULE_NAMES
 from adwa_jax.simulate import Outcome
 from scenarios.errors import InputError
 from scenarios.formats import MapFile, load_map
-from scenarios.suite import SUITE_NAMES, Suite, make_suite, save_suite, suite_from_barn_folder
+from scenarios.suite import SUITE_NAMES, Suite, save_suite
 from tuning.console import note, plans_table, progress_bar, results_table, show
 from tuning.evaluate import evaluate
+from tuning.options import (
+    MAP_HELP,
+    CountOption,
+    JsonOption,
+    MapOption,
+    MoversOption,
+    PresetOption,
+    QuietOption,
+    RangeOption,
+    ResolutionOption,
+    RobotOption,
+    SeedOption,
+    SensedOnlyOption,
+    SpeedOption,
+    SquaresOption,
+    SuiteFileOption,
+    SuiteOption,
+    UnknownOption,
+    UnknownPolicy,
+    Vehicle,
+    WeightsOption,
+    configured,
+    reach_of,
+    require_one_disc,
+)
 from tuning.outputs import ANIMATIONS, PICTURES, STDOUT, check_file, check_folder, parent_made, save_figure, write_json
 from tuning.planning import PlannedPath, as_json, plan_paths, planner_constants, planner_options, why_blocked
-from tuning.sources import Source, Work, read_grid, read_queries, read_suite, suite_in
-from tuning.weights_file import load_weights, parse_weight_rule
+from tuning.results import Results
+from tuning.sources import Source, Work, options_named, read_grid, read_queries, read_suite
+from tuning.suite_files import KINDS, suite_in
+from tuning.weights_file import parse_weight_rule
 
 app = typer.Typer(
     add_completion=False, pretty_exceptions_enable=False,
@@ -54,30 +83,6 @@ class ScopeName(StrEnum):
 
     start = "start"
     node = "node"
-
-
-class UnknownPolicy(StrEnum):
-    """What a map's unknown cells count as."""
-
-    free = "free"
-    occupied = "occupied"
-
-
-MAP_HELP = "MovingAI .map, ROS .yaml, BARN .world(.gz) or an image."
-MapOption = Annotated[Path | None, typer.Option("--map", help=MAP_HELP)]
-SuiteOption = Annotated[str | None, typer.Option("--suite", help=f"One of {', '.join(SUITE_NAMES)}.")]
-SuiteFileOption = Annotated[Path | None, typer.Option(help="A saved suite, or a folder of BARN .world files.")]
-CountOption = Annotated[int | None, typer.Option(help="How many scenarios; default: 100, or all of a file.")]
-MadeCountOption = Annotated[int, typer.Option("--count", help="How many scenarios.")]
-SeedOption = Annotated[int, typer.Option(help="Seed of scenarios that are made.")]
-PresetOption = Annotated[str, typer.Option(help=f"One of {', '.join(PRESETS)}.")]
-WeightsOption = Annotated[Path | None, typer.Option(help="TOML of constants that stand in for the preset's.")]
-JsonOption = Annotated[Path | None, typer.Option("--json", help="Write the results as JSON to this file, or print: -")]
-UnknownOption = Annotated[UnknownPolicy, typer.Option(help="What a map's unknown cells count as.")]
-ResolutionOption = Annotated[float, typer.Option(help="Side of a pixel of a plain image [m].")]
-SquaresOption = Annotated[int, typer.Option(help="With --map: unknown static obstacles a scenario.")]
-MoversOption = Annotated[int, typer.Option(help="With --map: movers a scenario.")]
-QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
 
 
 @app.callback(invoke_without_command=True)
@@ -112,7 +117,8 @@ def plan_command(
     _require_radius(robot_radius)
     constants = planner_constants(parse_weight_rule(weight_rule) if weight_rule is not None else None, robot_radius)
     options = planner_options(planner.value, scope.value, _budget(budget))
-    map_file = load_map(map, resolution)
+    with options_named(resolution="--resolution"):
+        map_file = load_map(map, resolution)
     queries = read_queries(map_file, start, goal, scen, limit, quiet)
     grid = read_grid(map_file, unknown.value, quiet)
     with progress_bar("planning", quiet) as progress, _sizes_refused(map_file.name):
@@ -121,7 +127,7 @@ def plan_command(
                for answer, expected in zip(answers, queries.expected, strict=True)]  # fmt: skip
     write_json(records, json_file)
     if not quiet and json_file != STDOUT and (queries.listed or answers[0].status == Status.FOUND):
-        show(plans_table(records))
+        show(plans_table(map_file.name, records))
     if figure:
         from tuning.figures import plan_figure
 
@@ -136,33 +142,89 @@ def evaluate_command(
     map: MapOption = None,
     count: CountOption = None,
     seed: SeedOption = 0,
+    sensed_only: SensedOnlyOption = False,
     preset: PresetOption = "paper",
     weights: WeightsOption = None,
+    robot: RobotOption = None,
+    v_max: SpeedOption = None,
+    sensor_range: RangeOption = None,
     unknown: UnknownOption = UnknownPolicy.occupied,
     resolution: ResolutionOption = 1.0,
     unknown_obstacles: SquaresOption = 5,
     movers: MoversOption = 5,
     json_file: JsonOption = None,
     out: Annotated[Path | None, typer.Option(help="Folder for results.json, results.csv and a contact sheet.")] = None,
+    feasible: Annotated[bool, typer.Option("--feasible", help="Prove which scenarios can be solved at all.")] = False,
+    gallery: Annotated[Path | None, typer.Option(help="Folder for pictures of the failures, by cause.")] = None,
     quiet: QuietOption = False,
 ) -> None:
     """Drive every scenario of a suite and judge the planner."""
     _check_outputs(json_file)
     check_folder("--out", out)
-    config = _config(preset, weights)
-    source = Source(suite, suite_file, map, count, seed, unknown.value, resolution, unknown_obstacles, movers)
-    chosen = _work(source, config, quiet).suite
+    check_folder("--gallery", gallery)
+    config = configured(preset, Vehicle(robot, v_max, sensor_range), weights)
+    source = Source(suite, suite_file, map, count, seed, unknown.value, resolution, unknown_obstacles, movers,
+                    sensed_only)  # fmt: skip
+    if feasible:
+        require_one_disc("--feasible", config)
+    work = _work(source, config, quiet)
+    chosen = work.suite
     with progress_bar(f"evaluating {chosen.name}", quiet) as progress, _sizes_refused(chosen.name):
         results = evaluate(chosen, config, progress=progress)
+    if feasible:
+        results = _labelled(results, chosen, config, quiet)
     write_json(results.summary(), json_file)
     if out:
         results.write(out)
         _draw_sheet(chosen, out / "scenarios.png", quiet)
+    if gallery:
+        _draw_gallery(gallery, work, results, config, quiet)
     if not quiet and json_file != STDOUT:
         show(results_table(results))
     if not results.reached.any():
         note(f"adwa: none of the {results.count} scenarios reached its goal; see their outcomes")
         raise typer.Exit(FOUND_NOTHING)
+
+
+@app.command("ablate")
+def ablate_command(
+    suite: SuiteOption = None,
+    suite_file: SuiteFileOption = None,
+    map: MapOption = None,
+    count: CountOption = None,
+    seed: SeedOption = 0,
+    sensed_only: SensedOnlyOption = False,
+    rule: Annotated[list[str] | None, typer.Option(help="Only this rule; may be given again; default: all.")] = None,
+    robot: RobotOption = None,
+    v_max: SpeedOption = None,
+    sensor_range: RangeOption = None,
+    unknown: UnknownOption = UnknownPolicy.occupied,
+    resolution: ResolutionOption = 1.0,
+    unknown_obstacles: SquaresOption = 5,
+    movers: MoversOption = 5,
+    out: Annotated[Path, typer.Option(help="Folder for ablation.md, .json, .csv and .png.")] = Path("ablation"),
+    quiet: QuietOption = False,
+) -> None:
+    """Compare the paper's and the extended planner with and without each rule, on common scenarios."""
+    from tuning.ablate import ablate
+    from tuning.ablation_report import ablation_table, draw_ablation, row_sentence, write_ablation
+
+    check_folder("--out", out)
+    rules, vehicle = _rules(rule), Vehicle(robot, v_max, sensor_range)
+    source = Source(suite, suite_file, map, count, seed, unknown.value, resolution, unknown_obstacles, movers,
+                    sensed_only)  # fmt: skip
+    chosen = _work(source, configured("paper", vehicle), quiet).suite
+    rows = []
+    with progress_bar(f"comparing on {chosen.name}", quiet) as progress, _sizes_refused(chosen.name):
+        for row in ablate(chosen, rules, vehicle.driving, progress):
+            rows.append(row)
+            write_ablation(out, chosen, rows)
+            if not quiet:
+                note(row_sentence(row))
+    draw_ablation(out, chosen, rows)
+    if not quiet:
+        show(ablation_table(chosen, rows))
+        print(f"wrote ablation.md, .json, .csv and .png in {out}")
 
 
 @app.command("drive")
@@ -172,8 +234,12 @@ def drive_command(
     map: MapOption = None,
     index: Annotated[int, typer.Option(help="Which scenario of the suite, from 0.")] = 0,
     seed: SeedOption = 0,
+    sensed_only: SensedOnlyOption = False,
     preset: PresetOption = "paper",
     weights: WeightsOption = None,
+    robot: RobotOption = None,
+    v_max: SpeedOption = None,
+    sensor_range: RangeOption = None,
     unknown: UnknownOption = UnknownPolicy.occupied,
     resolution: ResolutionOption = 1.0,
     unknown_obstacles: SquaresOption = 5,
@@ -187,16 +253,14 @@ def drive_command(
     from tuning.replay import draw_replay, replay
 
     _check_outputs(json_file, figure)
-    check_file("--animation", animation, ANIMATIONS)
-    config = _config(preset, weights)
+    _check_animation(animation)
+    config = configured(preset, Vehicle(robot, v_max, sensor_range), weights)
     if index < 0:
         raise InputError(f"--index: {index}; must be ≥ 0; the first scenario is 0")
-    count = None if suite_file is not None else index + 1
-    source = Source(suite, suite_file, map, count, seed, unknown.value, resolution, unknown_obstacles, movers)
+    source = Source(suite, suite_file, map, None, seed, unknown.value, resolution, unknown_obstacles, movers,
+                    sensed_only, index)  # fmt: skip
     work = _work(source, config, quiet)
     chosen = work.suite
-    if index >= len(chosen.scenarios):
-        raise InputError(f"--index: {index}; {chosen.name} has {len(chosen.scenarios)} scenarios; choose a lower one")
     with progress_bar("driving", quiet), _sizes_refused(chosen.name):
         driven = replay(chosen.scenarios[index], config)
     with progress_bar("drawing", quiet) as progress:
@@ -211,21 +275,20 @@ def drive_command(
 
 @suite_app.command("make")
 def suite_make_command(
-    name: Annotated[str, typer.Argument(help=f"One of {', '.join(SUITE_NAMES)}, or a folder of BARN .world files.")],
+    name: Annotated[str, typer.Argument(help=f"One of {', '.join(SUITE_NAMES)}, or {KINDS}.")],
     out: Annotated[Path, typer.Option(help="File to write.")],
-    count: MadeCountOption = 100,
+    count: CountOption = None,
     seed: SeedOption = 0,
+    sensed_only: SensedOnlyOption = False,
     quiet: QuietOption = False,
 ) -> None:
     """Write a suite to one file, with the recipe and seed that made it."""
     check_file("--out", out)
     if out.exists() and not out.is_file():
         raise InputError(f"--out: {out}; is no regular file, which a suite would replace; name another")
-    if name not in SUITE_NAMES and Path(name).is_dir():
-        made = suite_from_barn_folder(Path(name))
-    else:
-        with progress_bar(f"making {name}", quiet) as progress:
-            made = make_suite(name, seed, count, progress)
+    source = Source(name, None, None, count, seed, sensed_only=sensed_only)
+    with progress_bar(f"making {name}", quiet) as progress, options_named(**{"--suite": "NAME"}):
+        made = read_suite(source, 0.0, quiet, progress).suite
     save_suite(made, parent_made(out))
     if not quiet:
         print(f"wrote {out}: {len(made.scenarios)} scenarios of {made.name}")
@@ -233,7 +296,7 @@ def suite_make_command(
 
 @suite_app.command("show")
 def suite_show_command(
-    file: Annotated[Path, typer.Argument(help="A saved suite, or a folder of BARN .world files.")],
+    file: Annotated[Path, typer.Argument(help=f"{KINDS[0].upper()}{KINDS[1:]}.")],
     figure: Annotated[Path, typer.Option(help="Picture to write.")] = Path("suite.png"),
     limit: Annotated[int, typer.Option(help="Draw at most so many scenarios.")] = 24,
     quiet: QuietOption = False,
@@ -328,16 +391,24 @@ def _check_outputs(json_file: Path | None, figure: Path | None = None) -> None:
     check_file("--figure", figure, PICTURES)
 
 
-def _config(preset: str, weights: Path | None) -> Preset:
-    if preset not in PRESETS:
-        raise InputError(f"--preset: {preset!r}; the presets are {', '.join(PRESETS)}; choose one of them")
-    config = PRESETS[preset]()
-    return config._replace(constants=load_weights(weights, config.constants)) if weights else config
+def _rules(names: list[str] | None) -> tuple[str, ...]:
+    for name in names or ():
+        if name not in RULE_NAMES:
+            raise InputError(f"--rule: {name!r}; the rules are {', '.join(RULE_NAMES)}; choose among them")
+    return tuple(dict.fromkeys(names)) if names else RULE_NAMES
+
+
+def _check_animation(animation: Path | None) -> None:
+    check_file("--animation", animation, ANIMATIONS)
+    if animation is not None:
+        from tuning.animation import check_writer
+
+        check_writer(animation)
 
 
 def _work(source: Source, config: Preset, quiet: bool) -> Work:
     with progress_bar("making scenarios", quiet) as progress:
-        return read_suite(source, float(config.constants.robot.radius), quiet, progress)
+        return read_suite(source, reach_of(config.constants.robot), quiet, progress)
 
 
 @contextmanager
@@ -388,6 +459,22 @@ def _reason(answer: PlannedPath, record: dict[str, Any], map_file: MapFile, robo
     remedies = ["choose another goal", *["a smaller --robot-radius"] * (robot_radius > 0),
                 *["--unknown free"] * bool(map_file.unknown.any())]  # fmt: skip
     return f"--goal: {goal} is UNREACHABLE from --start {start}; no free way joins them; {' or '.join(remedies)}"
+
+
+def _labelled(results: Results, suite: Suite, config: Preset, quiet: bool) -> Results:
+    """The results with what is proven of each scenario."""
+    from scenarios.feasibility import label
+
+    with progress_bar("proving feasibility", quiet) as progress, _sizes_refused(suite.name):
+        labels = label(suite.scenarios, config.constants.robot, float(config.constants.behaviour.dt), progress)
+    return replace(results, feasibility=labels)
+
+
+def _draw_gallery(folder: Path, work: Work, results: Results, config: Preset, quiet: bool) -> None:
+    from tuning.gallery import write_gallery
+
+    with progress_bar("looking at failures", quiet) as progress:
+        write_gallery(folder, work.suite, results, config, work.y_down, progress=progress)
 
 
 def _draw_sheet(suite: Suite, path: Path, quiet: bool, limit: int = 24) -> None:

@@ -14,6 +14,7 @@ from rich.table import Table
 from rich.text import Text
 
 from adwa_jax.astar import Status
+from scenarios.feasibility import Feasibility
 from tuning.results import OVER_ALL, Results
 
 PATIENCE = 2.0  # [s] work shorter than this shows no bar
@@ -22,7 +23,7 @@ MOST_ROWS = 20  # of a table of plans
 UNITS = {  # of the measures a table shows
     "time": "s", "length": "m", "length_ratio": "", "spl": "", "breaking_points": "", "danger_points": "",
     "least_clearance": "m", "mean_clearance": "m", "curvature": "1/m", "angle_over_length": "rad/m",
-    "command_variation": "", "jerk": "m/s³", "barn_score": "", "brakings": "", "hit_while_stopped": "",
+    "command_variation": "", "jerk": "m/s³", "barn_score": "", "brakings": "", "replans": "", "hit_while_stopped": "",
     "optimal_length": "m", "planned_length": "m", "key_point_length": "m", "key_point_count": "", "expansions": "",
 }  # fmt: skip
 
@@ -71,6 +72,11 @@ def results_table(results: Results) -> Table:
     for name, count in summary["outcomes"].items():
         table.add_row(name, str(count), f"{count / results.count:.1%}")
     table.add_section()
+    if summary["feasible"] is not None:
+        _add_feasible(summary["feasible"], results.count, table)
+    for name, clearance in summary["closest_approach"].items():
+        shown = "–" if clearance is None else f"{clearance:.3f} m"
+        table.add_row(f"closest approach, {name}", shown, "of all driven")
     reached = f"mean of {int(results.reached.sum())} reached"
     for name, mean in summary["means"].items():
         shown = "–" if mean is None else f"{mean:.3f} {UNITS.get(name, '')}".rstrip()
@@ -78,14 +84,28 @@ def results_table(results: Results) -> Table:
     return table
 
 
-def plans_table(records: list[dict[str, Any]]) -> Table:
-    """The first `MOST_ROWS` plans, from their JSON objects, under a count of how they ended."""
+def _add_feasible(feasible: dict[str, Any], count: int, table: Table) -> None:
+    """What is proven of the scenarios, and the success among those kept."""
+    for kind in Feasibility:
+        table.add_row(f"proven {kind.name}" if kind != Feasibility.UNKNOWN else "neither proven",
+                      str(feasible[kind.name]), f"{feasible[kind.name] / count:.1%}")  # fmt: skip
+    for name in ("not_impossible", "possible"):
+        among = feasible[name]
+        rate = "–" if among["success_rate"] is None else f"{among['success_rate']:.1%}"
+        low, high = among["success_ci"]
+        table.add_row(f"success of the {among['count']} {name.replace('_', ' ')}", rate,
+                      f"95 %: {low:.1%} … {high:.1%} (Wilson)")  # fmt: skip
+    table.add_section()
+
+
+def plans_table(map_name: str, records: list[dict[str, Any]]) -> Table:
+    """The first `MOST_ROWS` plans, from their JSON objects, under the map's name and a count of how they ended."""
     counts = Counter(record["status"] for record in records)
-    title = ", ".join(f"{counts[status.name]} {status.name}" for status in Status if counts[status.name])
+    found = ", ".join(f"{counts[status.name]} {status.name}" for status in Status if counts[status.name])
     columns = {"status": "status", "length": "length", "expected": "listed", "expansions": "expanded",
                "breaking_points": "turns", "danger_points": "danger", "key_point_length": "key-point"}  # fmt: skip
     shown = {name: heading for name, heading in columns.items() if name in records[0]}
-    table = _table(title, "start", "goal", *shown.values(), left=2)
+    table = _table(f"{map_name}: {found}", "start", "goal", *shown.values(), left=2)
     for record in records[:MOST_ROWS]:
         points = [f"{record[end][0]:g},{record[end][1]:g}" for end in ("start", "goal")]
         table.add_row(*points, *(_cell(record[name]) for name in shown))

@@ -19,6 +19,7 @@ from adwa_jax.presets import Preset
 from adwa_jax.scenario import Scenario
 from adwa_jax.score import ScoreWeights
 from adwa_jax.simulate import Episode, drive_lanes
+from scenarios.errors import InputError
 from scenarios.padding import PaddedShape, pad, padded_shape, stack
 from scenarios.suite import Suite
 from tuning.results import Results
@@ -46,8 +47,11 @@ def evaluate(suite: Suite, config: Preset, weights: ScoreWeights | None = None,
              progress: Progress | None = None) -> Results:
     """Plan and drive every scenario of a suite; `weights`, if given, stand in for the configuration's.
 
-    Changing weights, limits or ω constants compiles nothing anew. `progress` is called after each batch.
+    Changing weights, limits or ω constants compiles nothing anew. `progress` is called after each batch. Raises
+    InputError for a suite without scenarios.
     """
+    if not suite.scenarios:
+        raise InputError(f"{suite.name}: 0 scenarios; there must be at least one; make the suite again")
     constants = config.constants if weights is None else replace(config.constants, weights=weights)
     constants = jax.tree.map(np.float32, constants)
     batches = _batches(suite.scenarios, constants, config.options)

@@ -1,7 +1,7 @@
 """The paper's figures and what goes with them: plans, drives, an animation, success rates.
 
 Results in, matplotlib figures out; nothing is computed here that a kernel computes. Conventions: `scenarios.drawing`.
-Dimension letters: P path cells; Q key points; T control steps; M movers.
+Dimension letters: P path cells; Q key points; T control steps; M movers; D discs of the robot.
 """
 
 from collections.abc import Mapping, Sequence
@@ -12,20 +12,23 @@ import jax.numpy as jnp
 import numpy as np
 
 from adwa_jax.astar import Status
-from adwa_jax.grid import Grid
+from adwa_jax.grid import Grid, Scalar
 from adwa_jax.keypoints import KeyPoints, turning_points
 from adwa_jax.metrics import danger_corners, danger_steps
 from adwa_jax.plan import Plan
 from adwa_jax.scenario import Scenario
 from adwa_jax.simulate import Episode, Outcome, Trace
+from adwa_jax.window import RobotLimits
 from scenarios.drawing import (
     BLACK,
     BLUE,
     FONT,
     ORANGE,
+    PURPLE,
     SKY,
     VERMILLION,
     draw_ends,
+    draw_hidden,
     draw_map,
     draw_mover_ways,
     draw_movers,
@@ -111,26 +114,34 @@ def compare_plans(comparisons: Sequence[Comparison], axes: Any = None, y_down: b
 
 
 def drive_figure(scenario: Scenario, plan: Plan, episode: Episode, trace: Trace, title: str = "",
-                 ax: "Axes | None" = None, y_down: bool = False, legend: bool = True) -> "Figure":
+                 ax: "Axes | None" = None, y_down: bool = False, legend: bool = True,
+                 robot: RobotLimits | None = None) -> "Figure":
     """Fig. 4: planned polyline dashed, driven path solid, key points, unknown squares, movers and the ways they took.
 
-    Movers are filled where they were when the episode ended and pale where they began; squares the robot never sensed
-    are pale too. A collision is crossed. Unbatched; the plan and trace may be padded. title: put before the outcome.
+    Movers are filled where they were when the episode ended and pale where they began; squares and hidden cells the
+    robot never sensed are pale too. The last route is drawn where it is not the first. A collision is crossed.
+    Unbatched; the plan and trace may be padded. title: put before the outcome. robot: its outline at the end is drawn
+    to scale.
     """
     ax = draw_map(scenario.grid, ax, y_down)
     steps = int(trace.length)
+    draw_hidden_cells(scenario, trace, ax)
     ways = driven_ways(scenario, trace)
     radius = np.asarray(scenario.movers.radius)
     draw_ends(scenario.start[:2], scenario.goal, ax)
-    _draw_sensed_squares(scenario, np.asarray(trace.known)[steps - 1] if steps else None, ax)
+    draw_sensed_squares(scenario, np.asarray(trace.known)[steps - 1] if steps else None, ax)
     pale = {"alpha": 0.35, "linestyle": ":", "zorder": 3.2}
     draw_movers(ways[0], radius, ax, "mover, start", **pale)
     draw_movers(ways[-1], radius, ax, "mover, end")
     draw_mover_ways(ways, ax, heads=False)
     if int(plan.key_point_count):
         draw_polyline(np.asarray(plan.key_points)[: int(plan.key_point_count)], ax, "--", "planned path")
+    draw_last_route(episode, trace, ax)
     path = driven_path(scenario, trace)
     ax.plot(*path.T, color=VERMILLION, linewidth=2.0, zorder=6, label="driven path", solid_joinstyle="round")
+    if robot is not None:
+        discs = disc_centres(path[-1], last_heading(scenario, trace), robot.disc_offsets)
+        draw_outline(discs, float(robot.radius), ax)
     _draw_last(path[-1], Outcome(int(episode.outcome)), ax)
     ax.set_title(f"{prefixed(title)}{drive_sentence(plan, episode)}", fontsize=FONT)
     if legend:
@@ -219,6 +230,17 @@ def driven_ways(scenario: Scenario, trace: Trace) -> np.ndarray:
     return np.concatenate([mover_ways(scenario.movers, 0.0)[:1], later])
 
 
+def last_heading(scenario: Scenario, trace: Trace) -> float:
+    """Where the robot faced when the episode ended [rad]; a robot that never drove: as the task says."""
+    steps = int(trace.length)
+    return float(np.asarray(trace.robot.heading)[steps - 1] if steps else np.asarray(scenario.start)[2])
+
+
+def disc_centres(position: np.ndarray, heading: float, offsets: Sequence[Scalar]) -> np.ndarray:
+    """[D, 2] (x, y) [m]: the centres of a robot's discs, so far ahead [m] of its position [2], heading in [rad]."""
+    return position + np.array(offsets, np.float64)[:, None] * np.array([np.cos(heading), np.sin(heading)])
+
+
 def route_sentence(planned: PlannedPath, route: Route) -> str:
     """Length, breaking points and danger points, or why there is no path."""
     if planned.status != Status.FOUND:
@@ -245,6 +267,50 @@ def draw_polyline(key_points: np.ndarray, ax: "Axes", linestyle: str, label: str
     between = key_points[1:-1]
     ax.plot(*between.T, linestyle="none", marker="D", markersize=4.5, color=BLACK, zorder=6.5,
             label="key point" if len(between) else "_")
+
+
+def draw_last_route(episode: Episode, trace: Trace, ax: "Axes") -> list[Any]:
+    """The route that was followed last, if it is another than the planned path; returns its line."""
+    if not int(episode.replans):
+        return []
+    route = np.asarray(trace.route.points)[: int(trace.route.count)]
+    return ax.plot(*route.T, color=PURPLE, linewidth=1.2, linestyle="-.", zorder=5.5, label="last route")
+
+
+def draw_hidden_cells(scenario: Scenario, trace: Trace, ax: "Axes") -> list[Any]:
+    """The hidden cells, pale where the robot never saw them; returns their collections."""
+    hidden, seen = np.asarray(scenario.hidden), np.asarray(trace.seen)
+    if not hidden.size:
+        return []
+    rows, columns = hidden.shape
+    found = hidden & seen[:rows, :columns]
+    unseen = draw_hidden(scenario.grid, hidden & ~found, ax)
+    for drawn in unseen:
+        drawn.set(facecolor="white", label="hidden cell never seen")
+    return draw_hidden(scenario.grid, found, ax) + unseen
+
+
+def draw_sensed_squares(scenario: Scenario, known: np.ndarray | None, ax: "Axes") -> list[Any]:
+    """The unknown squares, pale where `known` [S] is False; None: all pale. Returns their patches."""
+    valid = np.asarray(scenario.squares.valid)
+    patches = draw_squares(scenario.squares, ax)
+    sensed = np.zeros(len(patches), bool) if known is None else known[: len(valid)][valid]
+    for patch, seen in zip(patches, sensed, strict=True):
+        patch.set_facecolor(ORANGE if seen else "white")
+    for seen, label in ((True, "unknown square"), (False, "square never sensed")):
+        kind = [patch for patch, value in zip(patches, sensed, strict=True) if value == seen]
+        for index, patch in enumerate(kind):
+            patch.set_label("_" if index else label)
+    return patches
+
+
+def draw_outline(discs: np.ndarray, radius: float, ax: "Axes", label: str = "robot, end", **style: Any) -> list[Any]:
+    """The robot to scale: its discs [D, 2] of a radius [m]; returns their patches."""
+    from matplotlib.patches import Circle
+
+    style = {"facecolor": "none", "edgecolor": VERMILLION, "linewidth": 1.2, "zorder": 8.5} | style
+    return [ax.add_patch(Circle((x, y), radius, label="_" if index else label, **style))
+            for index, (x, y) in enumerate(discs)]  # fmt: skip
 
 
 def prefixed(title: str) -> str:
@@ -291,20 +357,6 @@ def _cell_size(grid: Grid, ax: "Axes") -> float:
     place = ax.get_subplotspec()
     width = figure_of(ax).get_figwidth() / (place.get_gridspec().ncols if place else 1)
     return 72.0 * max(width - 0.8, 1.0) / max(int(grid.height), int(grid.width))
-
-
-def _draw_sensed_squares(scenario: Scenario, known: np.ndarray | None, ax: "Axes") -> list[Any]:
-    """The unknown squares, pale where `known` [S] is False; None: all pale. Returns their patches."""
-    valid = np.asarray(scenario.squares.valid)
-    patches = draw_squares(scenario.squares, ax)
-    sensed = np.zeros(len(patches), bool) if known is None else known[: len(valid)][valid]
-    for patch, seen in zip(patches, sensed, strict=True):
-        patch.set_facecolor(ORANGE if seen else "white")
-    for seen, label in ((True, "unknown square"), (False, "square never sensed")):
-        kind = [patch for patch, value in zip(patches, sensed, strict=True) if value == seen]
-        for index, patch in enumerate(kind):
-            patch.set_label("_" if index else label)
-    return patches
 
 
 def _draw_last(position: np.ndarray, outcome: Outcome, ax: "Axes") -> None:

@@ -52,6 +52,13 @@ def write_json(content: Any, path: Path | None) -> None:
                         "check its folder, the permissions and the free space") from None
 
 
+def write_whole(path: Path, text: str) -> None:
+    """Write a file, or leave the one that was there as it was: never a part of one."""
+    unfinished = path.with_name(f".{path.name}.part")
+    unfinished.write_text(text, encoding="utf-8")
+    os.replace(unfinished, path)
+
+
 def json_text(content: Any) -> str:
     """A list with one object a line, an object with one field a line: paths stay readable."""
     if isinstance(content, list):

@@ -15,6 +15,7 @@ from adwa_jax.plan import Plan, plan
 from adwa_jax.presets import Preset
 from adwa_jax.scenario import Scenario
 from adwa_jax.simulate import Episode, Outcome, Trace, trace
+from adwa_jax.window import RobotLimits
 from scenarios.padding import pad
 from tuning.evaluate import batch_of, planned_columns
 from tuning.outputs import names_as_they_are, parent_made, save_figure
@@ -30,7 +31,7 @@ class Replay:
     plan: Plan
     episode: Episode
     trace: Trace
-    robot_radius: float  # [m]
+    robot: RobotLimits
 
     @property
     def outcome(self) -> Outcome:
@@ -63,7 +64,7 @@ def replay(scenario: Scenario, config: Preset) -> Replay:
     steps = max(LEAST_STEPS, 1 << (last_step - 1).bit_length())
     padded = pad(scenario, batch.shape)
     planned, episode, path = jax.device_get(_replay(padded, constants, batch.options, steps))
-    return Replay(scenario, planned, episode, path, float(constants.robot.radius))
+    return Replay(scenario, planned, episode, path, constants.robot)
 
 
 @partial(jax.jit, static_argnames=("options", "steps"))
@@ -85,10 +86,10 @@ def draw_replay(driven: Replay, title: str, figure: Path, animation: Path | None
     from tuning.figures import drive_figure
 
     parts = (driven.scenario, driven.plan, driven.episode, driven.trace)
-    save_figure(lambda: drive_figure(*parts, title=title, y_down=y_down), figure)
+    save_figure(lambda: drive_figure(*parts, title=title, y_down=y_down, robot=driven.robot), figure)
     if animation is None:
         return [figure]
     with names_as_they_are():
-        animate_drive(parent_made(animation), *parts, title=title, y_down=y_down, robot_radius=driven.robot_radius,
+        animate_drive(parent_made(animation), *parts, title=title, y_down=y_down, robot=driven.robot,
                       progress=progress)
     return [figure, animation]

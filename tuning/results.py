@@ -10,10 +10,13 @@ from typing import Any
 import numpy as np
 
 from adwa_jax.simulate import Outcome
+from scenarios.feasibility import Feasibility
 from tuning.intervals import wilson
 
-# Their means are over all scenarios: success is part of the first two, and the third never comes with it.
-OVER_ALL = ("spl", "barn_score", "hit_while_stopped")
+# Their means are over all scenarios: success is part of the first two, the last never comes with it, and who plans
+# anew succeeds more or less often for it.
+OVER_ALL = ("spl", "barn_score", "replans", "hit_while_stopped")
+QUANTILES = {"least": 0.0, "5 %": 0.05, "median": 0.5}
 
 
 @dataclass(frozen=True)
@@ -24,6 +27,7 @@ class Results:
     names: tuple[str, ...]  # N
     outcome: np.ndarray  # [N] int32, an `Outcome`
     measures: dict[str, np.ndarray]  # name -> [N]; planned path first, then driven path (units: metrics)
+    feasibility: np.ndarray | None = None  # [N] int32, a `Feasibility`; None: not asked
 
     @property
     def count(self) -> int:
@@ -48,6 +52,27 @@ class Results:
         taken = values if name in OVER_ALL else values[self.reached]
         return float(np.mean(taken, dtype=np.float64)) if taken.size else None
 
+    def success_among(self, kept: np.ndarray) -> dict[str, Any]:
+        """Success among some scenarios, kept [N] bool: how many they are, the rate (None of none), its interval."""
+        successes, count = int((self.reached & kept).sum()), int(kept.sum())
+        return {"count": count, "success_rate": successes / count if count else None,
+                "success_ci": list(wilson(successes, count))}  # fmt: skip
+
+    def closest_approach(self) -> dict[str, float | None]:
+        """Quantiles of the least clearance [m] over all scenarios that were driven, failures included."""
+        driven = self.measures["least_clearance"][self.outcome != Outcome.NO_PATH]
+        return {name: float(np.quantile(driven, share)) if driven.size else None for name, share in QUANTILES.items()}
+
+    def feasible(self) -> dict[str, Any] | None:
+        """Scenarios by what is proven of them, and the success among those that are not proven impossible; or None."""
+        if self.feasibility is None:
+            return None
+        return {
+            **{kind.name: int((self.feasibility == kind).sum()) for kind in Feasibility},
+            "not_impossible": self.success_among(self.feasibility != Feasibility.IMPOSSIBLE),
+            "possible": self.success_among(self.feasibility == Feasibility.POSSIBLE),
+        }
+
     def summary(self) -> dict[str, Any]:
         """The JSON form: count, outcomes, success_rate, success_ci, means and a list of scenarios."""
         successes = int(self.reached.sum())
@@ -55,8 +80,9 @@ class Results:
             "suite": self.suite,
             "count": self.count,
             "outcomes": self.outcomes(),
-            "success_rate": successes / self.count,
-            "success_ci": list(wilson(successes, self.count)),
+            **self.success_among(np.ones(self.count, np.bool_)),
+            "feasible": self.feasible(),
+            "closest_approach": self.closest_approach(),
             "means_over": f"successes ({successes}); {', '.join(OVER_ALL)}: all scenarios",
             "means": self.means(),
             "scenarios": [self.scenario(index) for index in range(self.count)],
@@ -65,6 +91,8 @@ class Results:
     def scenario(self, index: int) -> dict[str, Any]:
         """One scenario's row."""
         row = {name: values[index].item() for name, values in self.measures.items()}
+        if self.feasibility is not None:
+            row["feasibility"] = Feasibility(int(self.feasibility[index])).name
         return {"name": self.names[index], "outcome": Outcome(int(self.outcome[index])).name, **row}
 
     def write(self, folder: Path) -> list[Path]:

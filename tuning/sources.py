@@ -1,7 +1,8 @@
 """Where a command's work comes from: queries on a map, and suites from their options."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -11,10 +12,10 @@ from adwa_jax.grid import Grid
 from scenarios.errors import InputError
 from scenarios.formats import MapFile, load_map, load_scen
 from scenarios.formats.reading import LARGEST, bad_input, shown
-from scenarios.suite import SUITE_NAMES, Suite, load_suite, make_suite, suite_from_barn_folder, suite_on_map
+from scenarios.suite import SUITE_NAMES, Suite, make_suite, suite_on_map, without_maps
 from tuning.console import note
+from tuning.suite_files import DEFAULT_COUNT, suite_in
 
-DEFAULT_COUNT = 100
 MOST_OBSTACLES = 10_000  # of each kind in a scenario
 Progress = Callable[[int, int], None]
 
@@ -41,6 +42,8 @@ class Source:
     resolution: float = 1.0
     squares: int = 0
     movers: int = 0
+    sensed_only: bool = False
+    index: int | None = None  # of the one scenario that is wanted; the count then follows
 
 
 @dataclass(frozen=True)
@@ -81,35 +84,60 @@ def read_suite(source: Source, robot_radius: float, quiet: bool, progress: Progr
     given = [option for option in (source.suite, source.suite_file, source.map) if option is not None]
     if len(given) != 1:
         raise InputError(f"--suite, --suite-file, --map: {len(given)} given; exactly one says what to drive; give one")
+    count = "--count" if source.index is None else "--index"
+    with options_named(suite="--suite", seed="--seed", count=count, resolution="--resolution"):
+        work = _read(source, robot_radius, quiet, progress)
+    suite = _cut(work.suite, source)
+    return replace(work, suite=without_maps(suite) if source.sensed_only else suite)
+
+
+@contextmanager
+def options_named(**options: str) -> Iterator[None]:
+    """Errors that begin with the name of a field begin with that of its option instead."""
+    try:
+        yield
+    except InputError as error:
+        field, colon, rest = str(error).partition(":")
+        if field not in options:
+            raise
+        raise InputError(options[field] + colon + rest) from None
+
+
+def _read(source: Source, robot_radius: float, quiet: bool, progress: Progress | None) -> Work:
+    """At least as many scenarios as are wanted, where there are so many."""
     if source.map is not None:
         return _suite_on(source.map, source, robot_radius, quiet, progress)
-    if source.suite_file is not None:
-        return Work(_cut(suite_in(source.suite_file), source.count))
-    name = str(source.suite)
-    if name not in SUITE_NAMES and Path(name).is_dir():
-        return Work(_cut(suite_from_barn_folder(Path(name)), source.count))
-    return Work(make_suite(name, source.seed, _count(source), progress))
+    path = source.suite_file
+    if path is None and source.suite not in SUITE_NAMES and Path(str(source.suite)).exists():
+        path = Path(str(source.suite))
+    if path is not None:
+        return Work(suite_in(path, source.seed, _wanted(source), progress))
+    return Work(make_suite(str(source.suite), source.seed, _count(source), progress))
 
 
-def suite_in(path: Path) -> Suite:
-    """A saved suite, or a folder of BARN worlds."""
-    return suite_from_barn_folder(path) if path.is_dir() else load_suite(path)
+def _wanted(source: Source) -> int | None:
+    return source.count if source.index is None else source.index + 1
 
 
 def _count(source: Source) -> int:
-    return DEFAULT_COUNT if source.count is None else source.count
+    wanted = _wanted(source)
+    return DEFAULT_COUNT if wanted is None else wanted
 
 
-def _cut(suite: Suite, count: int | None) -> Suite:
-    """The first `count` scenarios of a suite that has them; all where it is None."""
+def _cut(suite: Suite, source: Source) -> Suite:
+    """The first scenarios, as many as the options say; all where they say nothing."""
     there = len(suite.scenarios)
     if there == 0:
         raise InputError(f"{suite.name}: 0 scenarios; must hold at least one; make it again")
-    if count is None:
+    if source.index is not None:
+        if source.index >= there:
+            raise InputError(f"--index: {source.index}; {suite.name} has {there} scenarios; choose a lower one")
         return suite
-    if not 1 <= count <= there:
-        raise InputError(f"--count: {count}; {suite.name} has {there} scenarios; choose from 1 to {there}")
-    return replace(suite, scenarios=suite.scenarios[:count], names=suite.names[:count])
+    if source.count is None:
+        return suite
+    if not 1 <= source.count <= there:
+        raise InputError(f"--count: {source.count}; {suite.name} has {there} scenarios; choose from 1 to {there}")
+    return replace(suite, scenarios=suite.scenarios[: source.count], names=suite.names[: source.count])
 
 
 def _suite_on(path: Path, source: Source, robot_radius: float, quiet: bool, progress: Progress | None) -> Work:

@@ -1,6 +1,6 @@
-"""Tuned constants as a TOML file: the score weights of eq. 9 and, if given, the ω constants of eq. 5.
+"""Tuned constants as a TOML file: the score weights of eq. 9, the ω constants of eq. 5, and those of the rules in use.
 
-    local_heading = 0.4        # α, eq. 9
+    local_heading = 0.4        # α, eq. 9; under the paper's method these four together
     clearance = 0.4            # β
     velocity = 0.6             # γ
     global_heading = 0.1       # δ
@@ -10,6 +10,10 @@
     sparse_gain = 0.6          # δ
     dense_ratio = 1.5          # may be left out
     sparse_ratio = 0.5         # may be left out
+    clearance_cap = 0.5        # [m]; this and what follows may be left out
+    contact_time = 1.5         # only with the rule that uses it
+
+A key that the preset's rules leave without effect is refused.
 """
 
 import tomllib
@@ -20,31 +24,61 @@ from typing import TypeVar
 import jax
 import numpy as np
 
-from adwa_jax.constants import Constants
+from adwa_jax.constants import Behaviour, Constants
 from adwa_jax.heuristic_weight import WeightRule
+from adwa_jax.rules import Rules
 from adwa_jax.score import ScoreWeights
 from scenarios.errors import InputError
 from scenarios.formats.reading import bad_input, shown
 
 SCORE = tuple(field.name for field in fields(ScoreWeights))
 RULE = tuple(field.name for field in fields(WeightRule))
+BEHAVIOUR = ("clearance_cap", "clearance_margin", "static_margin", "mover_margin", "mover_growth", "mover_cap",
+             "lookahead", "route_margin")  # fmt: skip
 OPTIONAL = ("dense_ratio", "sparse_ratio")
+REPLACED = ("velocity", "global_heading")  # by progress
+# What has an effect only with a rule.
+NEEDS = {
+    "progress": "progress", "on_route": "progress", "contact_time": "mover_terms", "mover_clearance": "mover_terms",
+    "forward": "reverse", "static_margin": "stopping", "mover_margin": "mover_margin", "mover_growth": "mover_margin",
+    "mover_cap": "mover_terms", "lookahead": "carrot", "route_margin": "replan",
+}  # fmt: skip
+PAPER = Rules()  # none beyond it
 LARGEST = 1e6  # beyond it sums of weighted terms may leave float32
-Kind = TypeVar("Kind", ScoreWeights, WeightRule)
+Kind = TypeVar("Kind", ScoreWeights, WeightRule, Behaviour)
 
 
-def load_weights(path: Path, constants: Constants) -> Constants:
+def load_weights(path: Path, constants: Constants, rules: Rules = PAPER) -> Constants:
     """`constants` with the file's values in place of theirs. InputError names the file, the key and the remedy."""
-    values = _read(path)
-    numbers = {key: _number(path, key, value) for key, value in values.items()}
-    _require(path, numbers, SCORE)
-    score = {key: numbers[key] for key in SCORE}
-    constants = replace(constants, weights=_made(str(path), ScoreWeights, score))
-    rule = {key: numbers[key] for key in RULE if key in numbers}
-    if rule:
+    numbers = {key: _number(path, key, value) for key, value in _read(path).items()}
+    for key in numbers:
+        _require_effect(path, key, rules)
+    if not rules.progress:
+        _require(path, numbers, tuple(key for key in SCORE if in_use(key, rules) and key not in NEEDS))
+    if any(key in RULE for key in numbers):
         _require(path, numbers, tuple(key for key in RULE if key not in OPTIONAL))
-        constants = replace(constants, weight_rule=_made(str(path), WeightRule, rule))
-    return constants
+    made = replace(
+        constants,
+        weights=_replaced(path, constants.weights, numbers, SCORE),
+        weight_rule=_replaced(path, constants.weight_rule, numbers, RULE),
+        behaviour=_replaced(path, constants.behaviour, numbers, BEHAVIOUR),
+    )
+    _require_a_weight(path, made.weights, rules)
+    return made
+
+
+def weights_text(constants: Constants, rules: Rules = PAPER) -> str:
+    """The TOML of every constant that has an effect, which `load_weights` reads back to the same values."""
+    parts = ((constants.weights, SCORE), (constants.weight_rule, RULE), (constants.behaviour, BEHAVIOUR))
+    lines = [f"{key} = {_decimal(getattr(part, key))}" for part, keys in parts for key in keys if in_use(key, rules)]
+    return "\n".join(lines) + "\n"
+
+
+def in_use(key: str, rules: Rules) -> bool:
+    """Whether a constant has an effect under the rules."""
+    if key in REPLACED:
+        return not rules.progress
+    return key not in NEEDS or getattr(rules, NEEDS[key])
 
 
 def parse_weight_rule(text: str) -> WeightRule:
@@ -71,8 +105,9 @@ def _read(path: Path) -> dict[str, object]:
 
 
 def _number(path: Path, key: str, value: object) -> float:
-    if key not in SCORE + RULE:
-        raise bad_input(path, f"{key}: unknown key", f"the keys are {', '.join(SCORE + RULE)}", "remove or rename it")
+    known = SCORE + RULE + BEHAVIOUR
+    if key not in known:
+        raise bad_input(path, f"{key}: unknown key", f"the keys are {', '.join(known)}", "remove or rename it")
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise bad_input(path, f"{key} = {shown(value)}", "must be a number", "write it without quotes or brackets")
     if not 0.0 <= value <= LARGEST:  # NaN too
@@ -80,11 +115,40 @@ def _number(path: Path, key: str, value: object) -> float:
     return float(value)
 
 
+def _require_effect(path: Path, key: str, rules: Rules) -> None:
+    if in_use(key, rules):
+        return
+    if key in REPLACED:
+        raise bad_input(path, f"{key}: without effect", "the preset's rule 'progress' stands in its place",
+                        "remove it, or choose --preset paper")
+    raise bad_input(path, f"{key}: without effect", f"the preset's rule '{NEEDS[key]}' is off",
+                    "remove it, or choose --preset extended")
+
+
 def _require(path: Path, values: dict[str, float], keys: tuple[str, ...]) -> None:
     missing = [key for key in keys if key not in values]
     if missing:
         raise bad_input(path, f"{', '.join(missing)}: missing", f"{', '.join(keys)} belong together",
                         f"add {'them' if len(missing) > 1 else 'it'}")
+
+
+def _require_a_weight(path: Path, weights: ScoreWeights, rules: Rules) -> None:
+    """All candidates would score alike."""
+    keys = [key for key in SCORE if in_use(key, rules)]
+    if not any(float(getattr(weights, key)) > 0.0 for key in keys):
+        raise bad_input(path, f"{', '.join(keys)}: all 0", "at least one weight must be above 0", "raise one")
+
+
+def _replaced(path: Path, part: Kind, numbers: dict[str, float], keys: tuple[str, ...]) -> Kind:
+    """The part with those of its fields that the file gives."""
+    values = {field.name: getattr(part, field.name) for field in fields(part)}
+    given = {key: numbers[key] for key in keys if key in numbers}
+    return _made(str(path), type(part), values | given) if given else part
+
+
+def _decimal(value: object) -> str:
+    """The shortest decimal that is the same number in float32."""
+    return repr(float(str(np.float32(value))))  # pyright: ignore[reportArgumentType]
 
 
 def _made(where: str, kind: type[Kind], values: dict[str, float]) -> Kind:

@@ -13,12 +13,14 @@ from rich.console import Console
 from rich.table import Table
 
 from adwa_jax.astar import search
-from adwa_jax.dwa import Decision, RobotState, decide
+from adwa_jax.dwa import Decision, Guidance, decide
 from adwa_jax.grid import cell_of
 from adwa_jax.heuristic_weight import weight_field
 from adwa_jax.obstacles import movers_at, sense
 from adwa_jax.plan import plan
-from adwa_jax.presets import paper
+from adwa_jax.presets import Preset, extended, paper
+from adwa_jax.rollout import RobotState
+from adwa_jax.route import ahead_of, route_through
 from adwa_jax.scenario import Scenario
 from scenarios.generators.paper import PaperSpec, generate
 from scenarios.padding import pad, padded_shape, stack
@@ -55,10 +57,10 @@ def searches(cells: int, count: int) -> Timing:
                  describe=lambda expansions: {"expansions, mean": float(np.mean(expansions))})
 
 
-def decisions(count: int) -> Timing:
-    """One DWA decision in each of `count` 25² worlds, at the start, under way, with what is sensed there."""
+def decisions(name: str, preset: Preset, count: int) -> Timing:
+    """One decision in each of `count` 25² worlds, at the start, under way, with what is sensed there."""
     worlds = scenarios_of(25, count)
-    constants, options = PRESET.constants, PRESET.options
+    constants, options = preset
 
     def plan_one(world: Scenario) -> Any:
         return plan(world.grid, world.start[:2], world.goal, constants, options.plan)
@@ -72,13 +74,23 @@ def decisions(count: int) -> Timing:
         unknown = jnp.zeros_like(world.squares.valid)
         sensed = sense(world.squares, unknown, world.movers, movers_at(world.movers, jnp.float32(0.0)),
                        world.start[:2], constants.behaviour.sensor_range)
-        return decide(robot, target, world.goal, planned.field, sensed, constants.weights, constants.robot,
-                      constants.behaviour.clearance_cap, constants.behaviour.dt, options.dwa)
+        route = route_through(planned.key_points, planned.key_point_count)
+        guidance = Guidance(target, world.goal, ahead_of(route, jnp.int32(1)))
+        return decide(robot, guidance, planned.field, sensed, constants, options)
+
+    def describe(decided: Decision) -> dict[str, float]:
+        candidates = float(np.prod(decided.candidates.admissible.shape[1:]))
+        return {"candidates": candidates, "candidate points": candidates * points_of(preset),
+                "admissible share": float(np.mean(decided.candidates.admissible))}  # fmt: skip
 
     run = jax.jit(lambda worlds, plans: jax.vmap(one)(worlds, plans))
-    share = {"candidates": float(options.dwa.v_samples * options.dwa.yaw_rate_samples)}
-    return timed("DWA", "decisions", count, lambda: run(worlds, plans), describe=lambda decided: share | {
-        "admissible share": float(np.mean(decided.candidates.admissible))})  # fmt: skip
+    return timed(f"DWA, {name}", "decisions", count, lambda: run(worlds, plans), describe=describe)
+
+
+def points_of(preset: Preset) -> int:
+    """At how many points a candidate's clearance is looked up, those of its braking included."""
+    dwa, rules = preset.options.dwa, preset.options.rules
+    return (dwa.watch_steps if rules.long_watch else dwa.horizon_steps) + dwa.halt_steps * rules.stopping
 
 
 def episodes(count: int) -> Timing:
@@ -113,7 +125,8 @@ def machine() -> dict[str, Any]:
 
 def main() -> None:
     """Measure, print, write."""
-    timings = [searches(25, 256), searches(100, 32), decisions(512), episodes(128)]
+    timings = [searches(25, 256), searches(100, 32), decisions("paper", PRESET, 512),
+               decisions("extended", extended(), 512), episodes(128)]
     path = Path("out/bench.json")
     path.parent.mkdir(exist_ok=True)
     rows = [timing._asdict() | {"rate": timing.rate} for timing in timings]

@@ -1,21 +1,32 @@
 """One decision against the double-precision oracle and by hand."""
 
 import math
-from functools import cache
+from dataclasses import replace
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from adwa_jax.dwa import DwaOptions, RobotState, decide, is_admissible, wrap
-from adwa_jax.grid import BILINEAR_EXCESS, distance_field
-from adwa_jax.obstacles import Sensed
+from adwa_jax.admissible import is_admissible
+from adwa_jax.constants import DwaOptions, Options
+from adwa_jax.dwa import Guidance, decide
+from adwa_jax.presets import paper
+from adwa_jax.rollout import RobotState, wrap
 from adwa_jax.score import ScoreWeights
 from adwa_jax.window import RobotLimits
-from tests.reference import distance as distance_reference
 from tests.reference import dwa as reference
-from tests.test_adwa_jax.worlds import counting, grid_of, random_map
+from tests.test_adwa_jax.scenes import (
+    EMPTY,
+    SUBDIVISION,
+    field_of,
+    looked_up,
+    random_scene,
+    scene_lattice,
+    sensed,
+    state,
+)
+from tests.test_adwa_jax.worlds import counting, grid_of
 
 OPTIONS = DwaOptions(v_samples=5, yaw_rate_samples=7, horizon_steps=6)
 DT = 0.25
@@ -24,66 +35,21 @@ LIMITS = {"radius": 0.25, "v_min": 0.0, "v_max": 1.0, "yaw_rate_max": 1.5, "brak
 ROBOT = RobotLimits(**LIMITS, acceleration=1.0, yaw_acceleration=3.0)
 ORACLE_ROBOT = reference.Robot(**LIMITS, a_max=1.0, yaw_a_max=3.0)
 WEIGHTS = (0.4, 0.3, 0.5, 0.1)
-SUBDIVISION = 2
 
 decided, traces = counting(decide, static_argnames="options")
-field_of = jax.jit(distance_field, static_argnames="subdivision")
-EMPTY = field_of(grid_of(np.zeros((12, 12), bool)), subdivision=SUBDIVISION)
 
 
-def state(x, y, heading, v, yaw_rate):
-    return RobotState(*map(jnp.float32, (x, y, heading, v, yaw_rate)))
-
-
-def sensed(squares=(), movers=(), capacity=3):
-    """Known squares (centre, half width) and seen movers (position, velocity, radius) among unknown, unseen ones."""
-    pad_squares = [*squares, *[((6.0, 6.0), 50.0)] * (capacity - len(squares))]
-    pad_movers = [*movers, *[((6.0, 6.0), (0.0, 0.0), 50.0)] * (capacity - len(movers))]
-    return Sensed(
-        square_centre=jnp.asarray([square[0] for square in pad_squares], jnp.float32),
-        square_half_width=jnp.asarray([square[1] for square in pad_squares], jnp.float32),
-        square_known=jnp.arange(capacity) < len(squares),
-        position=jnp.asarray([mover[0] for mover in pad_movers], jnp.float32),
-        velocity=jnp.asarray([mover[1] for mover in pad_movers], jnp.float32),
-        radius=jnp.asarray([mover[2] for mover in pad_movers], jnp.float32),
-        seen=jnp.arange(capacity) < len(movers),
-        square_rounding=jnp.zeros(capacity, jnp.float32),
-    )
+def constants_of(weights=WEIGHTS, robot=ROBOT):
+    """Those of a decision; the others, of the plan and the closed loop, are the preset's."""
+    base = paper().constants
+    weights = weights if isinstance(weights, ScoreWeights) else ScoreWeights(*weights)
+    return replace(base, weights=weights, robot=robot, behaviour=replace(base.behaviour, dt=DT, clearance_cap=CAP))
 
 
 def choose(robot_state, local_target, goal=(11.0, 6.0), field=EMPTY, known=None, weights=WEIGHTS, robot=ROBOT,
            options=OPTIONS):
-    return decided(robot_state, jnp.float32(local_target), jnp.float32(goal), field, known or sensed(),
-                   ScoreWeights(*weights), robot, jnp.float32(CAP), jnp.float32(DT), options=options)
-
-
-def looked_up(lattice, x, y):
-    """The documented lower bound of the distance, in double precision, from an exact lattice."""
-    rows, columns = lattice.shape
-    u, v = (min(max(SUBDIVISION * c, 0.0), n - 1.0) for c, n in ((x, columns), (y, rows)))
-    i, j = min(int(v), rows - 2), min(int(u), columns - 2)
-    p, q = u - j, v - i
-    below = lattice[i, j] * (1 - p) + lattice[i, j + 1] * p
-    above = lattice[i + 1, j] * (1 - p) + lattice[i + 1, j + 1] * p
-    return below * (1 - q) + above * q - BILINEAR_EXCESS / SUBDIVISION
-
-
-def random_scene(seed):
-    """A robot somewhere free in a random map, with squares and movers about it."""
-    random = np.random.default_rng(seed)
-    occupied = random_map(seed, (12, 12), 0.12)
-    row, column = np.argwhere(~occupied)[random.integers((~occupied).sum())]
-    here = np.array([column, row]) + random.uniform(0.4, 0.6, 2)
-    known = [(tuple(here + random.uniform(-4, 4, 2)), random.uniform(0.1, 0.4)) for _ in range(seed % 3)]
-    seen = [(tuple(here + random.uniform(-4, 4, 2)), tuple(random.uniform(-0.8, 0.8, 2)), random.uniform(0.1, 0.4))
-            for _ in range(seed // 3 % 3)]
-    motion = (random.uniform(-math.pi, math.pi), random.uniform(0, 1), random.uniform(-1.5, 1.5))
-    return occupied, (*here, *motion), known, seen, tuple(random.uniform(0, 12, 2)), tuple(random.uniform(0, 12, 2))
-
-
-@cache
-def scene_lattice(seed):
-    return distance_reference.lattice_distance(random_scene(seed)[0], SUBDIVISION)
+    return decided(robot_state, Guidance(jnp.float32(local_target), jnp.float32(goal)), field, known or sensed(),
+                   constants_of(weights, robot), options=Options(dwa=options))
 
 
 @pytest.mark.parametrize("normalisation", ["sum", "minmax", "none"])
@@ -109,13 +75,14 @@ def test_decisions_equal_the_oracle(normalisation):
 
 def assert_candidates_agree(found, expected):
     found = jax.tree.map(np.asarray, found)
+    assert found.terms[4:] == (None,) * 5  # those of eq. 9 and no others
     for n, candidate in enumerate(expected):
         index = divmod(n, 7)
         assert float(found.v[index[0]]) == pytest.approx(candidate.v, abs=1e-6)
         assert float(found.yaw_rate[index[1]]) == pytest.approx(candidate.yaw_rate, abs=1e-6)
         assert float(found.clearance[index]) == pytest.approx(candidate.clearance, abs=2e-5)
         assert bool(found.admissible[index]) == candidate.admissible
-        for term, value in zip(found.terms, candidate.terms, strict=True):
+        for term, value in zip(found.terms[:4], candidate.terms, strict=True):
             assert float(term[index]) == pytest.approx(value, abs=1e-3)
         if candidate.admissible:
             assert float(found.score[index]) == pytest.approx(candidate.score, abs=1e-3)
@@ -227,8 +194,7 @@ def test_gradients_of_scores_and_commands_are_finite():
     def outputs(robot_state, weights, target, mover):
         known = sensed(squares=[((3.0, 6.0), 1.0)])._replace(position=jnp.broadcast_to(mover, (3, 2)),
                                                              seen=jnp.array([True, False, False]))
-        found = decide(robot_state, target, target, field, known, weights, ROBOT, jnp.float32(CAP), jnp.float32(DT),
-                       OPTIONS)
+        found = decide(robot_state, Guidance(target, target), field, known, constants_of(weights), Options(dwa=OPTIONS))
         score = jnp.sum(jnp.where(found.candidates.admissible, found.candidates.score, 0.0))
         return jnp.stack([score, found.v, found.yaw_rate])
 
@@ -259,8 +225,7 @@ def test_vmap_equals_a_loop():
     target = jnp.float32([9.0, 3.0])
 
     def one(robot_state):
-        return decide(robot_state, target, target, EMPTY, box, ScoreWeights(*WEIGHTS), ROBOT, jnp.float32(CAP),
-                      jnp.float32(DT), OPTIONS)
+        return decide(robot_state, Guidance(target, target), EMPTY, box, constants_of(), Options(dwa=OPTIONS))
 
     together = jax.jit(jax.vmap(one))(states)
     for k, start in enumerate(starts):

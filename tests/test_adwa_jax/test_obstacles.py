@@ -184,6 +184,51 @@ def test_movers_are_met_where_they_will_be():
     np.testing.assert_allclose(at_once, [math.sqrt(5) - 0.25, 1.75, math.sqrt(20) - 0.25], rtol=1e-6)
 
 
+BORDER = jnp.float32([(0.0, 0.0), (10.0, 6.0)])
+
+
+def predicted_position(position, velocity, ahead, radius=0.5, border=BORDER):
+    """Where a mover is expected, from its distances to three points."""
+    known = KNOWN._replace(position=jnp.float32([position, (0, 0)]), velocity=jnp.float32([velocity, (0, 0)]),
+                           radius=jnp.float32([radius, 1.0]), border=border)
+    x, y = jnp.float32([(0.0, 0.0), (20.0, 0.0), (0.0, 20.0)]).T
+    distances = np.asarray(clearance_to_movers(known, x, y, jnp.float32(ahead)), float) + radius
+    to_origin, to_right, to_top = distances**2
+    return (400 + to_origin - to_right) / 40, (400 + to_origin - to_top) / 40
+
+
+@pytest.mark.parametrize(("position", "velocity", "ahead", "expected"), [
+    ((8.0, 3.0), (1.0, 0.0), 1.0, (9.0, 3.0)),  # not there yet
+    ((8.0, 3.0), (1.0, 0.0), 1.5, (9.5, 3.0)),  # its outline touches the border at x = 10
+    ((8.0, 3.0), (1.0, 0.0), 2.0, (9.0, 3.0)),  # half a metre back
+    ((1.0, 3.0), (-1.0, 0.0), 2.0, (2.0, 3.0)),
+    ((8.0, 1.0), (1.0, -2.0), 2.0, (9.0, 4.0)),  # off both walls of a corner
+    ((2.0, 5.0), (0.0, 1.0), 1.0, (2.0, 5.0)),
+    ((2.0, 3.0), (0.5, 0.25), 3.0, (3.5, 3.75)),
+])
+def test_movers_are_expected_to_turn_back_at_the_border(position, velocity, ahead, expected):
+    np.testing.assert_allclose(predicted_position(position, velocity, ahead), expected, atol=2e-4)
+    straight_on = np.add(position, np.multiply(ahead, velocity))
+    np.testing.assert_allclose(predicted_position(position, velocity, ahead, border=None), straight_on, atol=2e-4)
+
+
+@pytest.mark.parametrize(("position", "velocity", "ahead", "expected"), [
+    ((9.8, 3.0), (1.0, 0.0), 1.0, (10.8, 3.0)),  # on its way out
+    ((-1.0, 3.0), (1.0, 0.0), 2.0, (1.0, 3.0)),  # on its way in
+    ((9.8, 5.0), (1.0, 1.0), 1.0, (10.8, 5.0)),  # on its way out to the right, inside above and below
+])
+def test_mover_that_is_on_the_border_already_goes_on_through_it(position, velocity, ahead, expected):
+    np.testing.assert_allclose(predicted_position(position, velocity, ahead), expected, atol=2e-4)
+
+
+def test_expected_and_true_movers_agree_until_they_turn_back_twice():
+    # Movers of the suites turn back in the box in which their outlines stay on the map: that of the prediction.
+    world = movers({"position": (8.0, 1.0), "velocity": (0.75, -0.5), "low": (0.5, 0.5), "high": (9.5, 5.5)})
+    for time in (0.0, 1.0, 2.5, 4.0, 8.0):
+        truth = states_at(world, jnp.float32(time)).position[0]
+        np.testing.assert_allclose(predicted_position((8.0, 1.0), (0.75, -0.5), time), truth, atol=2e-4)
+
+
 def test_nothing_known_is_far_away_and_finite():
     nothing = KNOWN._replace(square_known=jnp.array([False, False]), seen=jnp.array([False, False]))
     none_at_all = jax.tree.map(lambda leaf: leaf[:0], KNOWN)

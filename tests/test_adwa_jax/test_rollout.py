@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from adwa_jax.rollout import Pose, euler_step, rollout
+from adwa_jax.rollout import Pose, euler_step, points, rollout
 from tests.reference import dwa as reference
 from tests.test_adwa_jax.worlds import many_examples
 
@@ -96,3 +96,36 @@ def test_gradients_by_hand():
     slopes = jax.jit(jax.grad(end_x, argnums=(0, 1)))(jnp.float32(1.0), jnp.float32(0.8))
     assert float(slopes[0]) == pytest.approx(0.5 + 0.5 * math.cos(0.4), rel=1e-5)
     assert float(slopes[1]) == pytest.approx(-0.25 * math.sin(0.4), rel=1e-5)
+
+
+follow = jax.jit(points, static_argnames="stride")
+profile = st.lists(st.floats(-1.5, 1.5), min_size=STEPS, max_size=STEPS)
+
+
+@many_examples
+@given(st.floats(-4, 4), profile)
+def test_points_of_a_yaw_rate_profile_are_euler_steps(heading, yaw_rates):
+    found = follow(jnp.float32(heading), jnp.float32(yaw_rates)[:, None], jnp.float32(0.1))
+    x = y = 0.0
+    for k, yaw_rate in enumerate(yaw_rates):
+        ((dx, dy, heading),) = reference.rollout((0.0, 0.0, heading), 1.0, yaw_rate, 0.1, 1)
+        x, y = x + dx, y + dy
+        np.testing.assert_allclose([found.move_x[k, 0], found.move_y[k, 0]], [dx, dy], atol=2e-6)
+        np.testing.assert_allclose([found.cosine[k, 0], found.sine[k, 0]], [math.cos(heading), math.sin(heading)],
+                                   atol=1e-5)
+    np.testing.assert_allclose([found.move_x.sum(), found.move_y.sum()], [x, y], atol=1e-5)
+
+
+@many_examples
+@given(st.floats(-4, 4), profile)
+def test_double_steps_are_two_euler_steps_but_for_the_bend_between_them(heading, yaw_rates):
+    found = follow(jnp.float32(heading), jnp.float32(yaw_rates)[:, None], jnp.float32(0.1), stride=2)
+    off = 0.0
+    for k, yaw_rate in enumerate(yaw_rates):
+        *_, (x, y, heading) = reference.rollout((0.0, 0.0, heading), 1.0, yaw_rate, 0.1, 2)
+        # Two steps of 0.1 at an angle a to each other reach 0.2 cos(a / 2), in the direction of a single one of 0.2.
+        bend = 0.2 * (1 - math.cos(yaw_rate * 0.1 / 2))
+        off = max(off, math.dist((x, y), (found.move_x[k, 0], found.move_y[k, 0])) - bend)
+        np.testing.assert_allclose([found.cosine[k, 0], found.sine[k, 0]], [math.cos(heading), math.sin(heading)],
+                                   atol=1e-5)
+    assert off < 2e-6

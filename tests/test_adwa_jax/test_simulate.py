@@ -10,18 +10,16 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from adwa_jax.constants import Behaviour, Options, PlanOptions
-from adwa_jax.constants import DwaOptions
+from adwa_jax.constants import Behaviour, DwaOptions, Options, PlanOptions
 from adwa_jax.plan import plan
 from adwa_jax.presets import paper
-from adwa_jax.scenario import Movers, Scenario, UnknownSquares
 from adwa_jax.score import ScoreWeights
 from adwa_jax.simulate import Outcome, drive, trace
 from adwa_jax.window import RobotLimits
 from tests.reference import distance as distance_reference
 from tests.reference import metrics as metrics_reference
 from tests.reference.dwa import square_distance
-from tests.test_adwa_jax.worlds import SHAPE, counting, drawn, grid_of, random_map
+from tests.test_adwa_jax.worlds import counting, drawn, random_map, scenario
 
 OPTIONS = Options(plan=PlanOptions(subdivision=2), dwa=DwaOptions(5, 9, 10))
 DT = 0.1
@@ -34,7 +32,6 @@ CONSTANTS = replace(
                         danger_clearance=0.1, stuck_radius=0.25, stuck_time=15.0),
 )
 STEPS = 250  # rows kept of a trace; every time limit here is shorter
-CAPACITY = 2  # unknown squares and movers
 
 
 def changed(**behaviour):
@@ -44,32 +41,6 @@ def changed(**behaviour):
 def crawling():
     """A robot that cannot be said to move."""
     return replace(CONSTANTS, robot=replace(CONSTANTS.robot, v_max=5e-4))
-
-
-def scenario(occupied, start, goal, *, squares=(), movers=(), heading=None, time_limit=24.0, shape=SHAPE,
-             reference_length=0.0):
-    """squares: (x, y, half width); movers: (x, y, vx, vy, radius) mirrored in the 12 × 12 m box."""
-    fill_squares = [*squares, *[(6.0, 6.0, 9.0)] * (CAPACITY - len(squares))]
-    fill_movers = [*movers, *[(6.0, 6.0, 0.0, 0.0, 9.0)] * (CAPACITY - len(movers))]
-    boxes, discs = jnp.asarray(fill_squares, jnp.float32), jnp.asarray(fill_movers, jnp.float32)
-    return Scenario(
-        grid=grid_of(occupied, shape),
-        hidden=jnp.zeros((0, 0), bool),
-        start=jnp.asarray([*start, 0.0 if heading is None else heading], jnp.float32),
-        heading_given=jnp.bool_(heading is not None),
-        goal=jnp.asarray(goal, jnp.float32),
-        goal_tolerance=jnp.float32(0.4),
-        time_limit=jnp.float32(time_limit),
-        reference_length=jnp.float32(reference_length),
-        squares=UnknownSquares(boxes[:, :2], boxes[:, 2], jnp.zeros(CAPACITY, jnp.float32),
-                               jnp.arange(CAPACITY) < len(squares)),
-        movers=Movers(
-            radius=discs[:, 4], position=discs[:, :2], velocity=discs[:, 2:4],
-            low=jnp.zeros((CAPACITY, 2), jnp.float32), high=jnp.full((CAPACITY, 2), 12.0, jnp.float32),
-            track=jnp.zeros((CAPACITY, 0, 3), jnp.float32), track_length=jnp.zeros(CAPACITY, jnp.int32),
-            period=jnp.zeros(CAPACITY, jnp.float32), valid=jnp.arange(CAPACITY) < len(movers),
-        ),
-    )  # fmt: skip
 
 
 def whole_run(world, constants):

@@ -6,6 +6,7 @@ import os
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import jax
@@ -14,11 +15,14 @@ import numpy as np
 import pytest
 
 from adwa_jax.astar import SearchOptions, search
-from adwa_jax.dwa import Decision, DwaOptions, RobotState, decide
+from adwa_jax.constants import DwaOptions, Options
+from adwa_jax.dwa import Decision, Guidance, decide
 from adwa_jax.grid import BILINEAR_EXCESS, DistanceField, Grid, distance_field
 from adwa_jax.heuristic_weight import WeightRule, weight_field
 from adwa_jax.keypoints import key_points, turning_points
 from adwa_jax.obstacles import Sensed
+from adwa_jax.presets import paper
+from adwa_jax.rollout import RobotState
 from adwa_jax.score import ScoreWeights
 from adwa_jax.window import RobotLimits
 
@@ -141,11 +145,11 @@ def _decide_one(occupied, state, local, goal, disc) -> Decision:
     no_squares = jnp.zeros((0, 2)), jnp.zeros(0), jnp.zeros(0, bool)
     sensed = Sensed(*no_squares, disc[:, :2], disc[:, 2:4], disc[:, 4], jnp.ones(count, bool), jnp.zeros(0))
     robot = RobotLimits(0.25, 0.0, 1.0, 1.5, acceleration=1.0, yaw_acceleration=3.0, brake=1.0, yaw_brake=1e9)
-    weights = ScoreWeights(0.4, 0.2, 0.2, 0.1)
-    return decide(
-        RobotState(*state), local, goal, _yardsticks_field(occupied), sensed, weights, robot, jnp.float32(1.0),
-        jnp.float32(0.1), DwaOptions(11, 21, 30, "sum"),
-    )  # fmt: skip
+    constants = paper().constants
+    constants = replace(constants, weights=ScoreWeights(0.4, 0.2, 0.2, 0.1), robot=robot,
+                        behaviour=replace(constants.behaviour, dt=0.1, clearance_cap=1.0))
+    return decide(RobotState(*state), Guidance(local, goal), _yardsticks_field(occupied), sensed, constants,
+                  Options(dwa=DwaOptions(11, 21, 30, "sum")))
 
 
 def _yardsticks_field(occupied) -> DistanceField:

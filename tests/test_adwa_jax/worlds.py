@@ -1,4 +1,4 @@
-"""Small maps for the kernel tests: all padded to one shape, so that each kernel compiles once."""
+"""Small maps and tasks for the kernel tests: all padded to one shape, so that each kernel compiles once."""
 
 from functools import wraps
 
@@ -9,9 +9,11 @@ from hypothesis import settings
 from hypothesis import strategies as st
 
 from adwa_jax.grid import Grid
+from adwa_jax.scenario import Movers, Scenario, UnknownSquares
 
 SHAPE = (12, 12)
 SIZES = ((9, 9), (12, 10), (5, 12))
+CAPACITY = 2  # unknown squares and movers
 
 few_examples = settings(max_examples=15, deadline=None, derandomize=True)
 many_examples = settings(max_examples=50, deadline=None, derandomize=True)
@@ -73,3 +75,41 @@ def counting(function, **jit_options):
 def cell(row_column):
     """[2] int32 of a (row, col) pair."""
     return jnp.asarray(row_column, jnp.int32)
+
+
+def squares_of(squares):
+    """Unknown squares from (x, y, half width) or (x, y, half width, rounding), up to `CAPACITY`; then invalid ones."""
+    rows = [(*square, 0.0)[:4] for square in squares]
+    boxes = jnp.asarray([*rows, *[(6.0, 6.0, 9.0, 0.0)] * (CAPACITY - len(rows))], jnp.float32)
+    return UnknownSquares(boxes[:, :2], boxes[:, 2], boxes[:, 3], jnp.arange(CAPACITY) < len(rows))
+
+
+def movers_of(movers):
+    """Movers (x, y, vx, vy, radius) mirrored in the 12 × 12 m box, up to `CAPACITY`; then invalid ones."""
+    discs = jnp.asarray([*movers, *[(6.0, 6.0, 0.0, 0.0, 9.0)] * (CAPACITY - len(movers))], jnp.float32)
+    return Movers(
+        radius=discs[:, 4], position=discs[:, :2], velocity=discs[:, 2:4],
+        low=jnp.zeros((CAPACITY, 2), jnp.float32), high=jnp.full((CAPACITY, 2), 12.0, jnp.float32),
+        track=jnp.zeros((CAPACITY, 0, 3), jnp.float32), track_length=jnp.zeros(CAPACITY, jnp.int32),
+        period=jnp.zeros(CAPACITY, jnp.float32), valid=jnp.arange(CAPACITY) < len(movers),
+    )  # fmt: skip
+
+
+def scenario(occupied, start, goal, *, squares=(), movers=(), hidden=None, heading=None, time_limit=24.0, shape=SHAPE,
+             reference_length=0.0):
+    """A task on a drawn map; `hidden` [rows, columns] bool: occupied cells of which the robot's map shows nothing."""
+    concealed = np.zeros((0, 0), bool) if hidden is None else np.zeros(shape or occupied.shape, bool)
+    if hidden is not None:
+        concealed[: hidden.shape[0], : hidden.shape[1]] = hidden
+    return Scenario(
+        grid=grid_of(occupied, shape),
+        hidden=jnp.asarray(concealed),
+        start=jnp.asarray([*start, 0.0 if heading is None else heading], jnp.float32),
+        heading_given=jnp.bool_(heading is not None),
+        goal=jnp.asarray(goal, jnp.float32),
+        goal_tolerance=jnp.float32(0.4),
+        time_limit=jnp.float32(time_limit),
+        reference_length=jnp.float32(reference_length),
+        squares=squares_of(squares),
+        movers=movers_of(movers),
+    )

@@ -1,3 +1,4 @@
+from dataclasses import replace
 from types import SimpleNamespace
 
 import jax
@@ -9,10 +10,12 @@ from matplotlib.patches import Circle, Rectangle
 from PIL import Image
 
 from adwa_jax.astar import SearchResult, Status
-from adwa_jax.dwa import RobotState
 from adwa_jax.metrics import Measures, PlannedMeasures
 from adwa_jax.obstacles import MoverStates
 from adwa_jax.plan import Plan
+from adwa_jax.presets import jackal
+from adwa_jax.rollout import RobotState
+from adwa_jax.route import Route
 from adwa_jax.simulate import Episode, Outcome, Trace
 from scenarios.drawing import ORANGE
 from scenarios.generators import toy
@@ -151,10 +154,11 @@ def test_a_map_that_counts_rows_downwards_is_drawn_so():
 
 
 SCENARIO = toy.generate(jax.random.key(0), toy.ToySpec(drawing="S..o\n.##.\n>.oG"))
+NONE_HIDDEN = np.zeros((0, 0), bool)
 X, Y = np.array([0.5, 1.0, 1.5]), np.array([2.0, 1.5, 1.5])
 
 
-def trace_of(steps=3, rows=5):
+def trace_of(steps=3, rows=5, seen=NONE_HIDDEN):
     """A drive of `steps` steps in arrays of `rows`, its movers and squares padded to 3."""
     def column(values):
         return np.concatenate([values, np.repeat(values[-1:], rows - len(values))]).astype(np.float32)
@@ -167,13 +171,14 @@ def trace_of(steps=3, rows=5):
     known = np.zeros((rows, 3), bool)
     known[1:, 0] = True
     target = np.tile(np.float32([3.5, 0.5]), (rows, 1))
-    return Trace(robot, MoverStates(mover, mover, present), known, target, zero, np.int32(steps))
+    route = Route(np.float32([[0.5, 2.5], [0.5, 0.5], [3.5, 0.5], [3.5, 0.5]]), np.int32(3), np.zeros(4, np.float32))
+    return Trace(robot, MoverStates(mover, mover, present), known, target, zero, np.int32(steps), route, seen)
 
 
-def episode_of(outcome, stopped=False, time=0.3):
+def episode_of(outcome, stopped=False, time=0.3, replans=0):
     measures = Measures(*[np.float32(0.0)] * len(Measures._fields))
     measures = measures._replace(time=np.float32(time), length=np.float32(1.7), least_clearance=np.float32(0.25))
-    return Episode(np.int32(outcome), np.bool_(stopped), np.int32(0), measures)
+    return Episode(np.int32(outcome), np.bool_(stopped), np.int32(0), np.int32(replans), measures)
 
 
 PLAN = hand_made_plan(np.array([[2, 0], [0, 3]]), np.array([[2, 0], [1, 3], [0, 3]]))
@@ -201,6 +206,37 @@ def test_only_squares_that_were_sensed_are_filled():
     squares = [patch for patch in ax.patches if isinstance(patch, Rectangle)]
     assert [to_hex(square.get_facecolor()) for square in squares] == [ORANGE.lower(), "#ffffff"]
     assert [square.get_label() for square in squares] == ["unknown square", "square never sensed"]
+
+
+def test_hidden_cells_are_filled_where_they_were_seen():
+    hidden = np.zeros((3, 4), bool)
+    hidden[0, 1] = hidden[2, 2] = True
+    seen = np.zeros((16, 16), bool)  # padded, as the kernel gives it
+    seen[0, 1] = True
+    ax = drive_figure(replace(SCENARIO, hidden=hidden), PLAN, episode_of(Outcome.REACHED), trace_of(seen=seen)).axes[0]
+    (filled,), (pale,) = ([drawn for drawn in ax.collections if drawn.get_label() == label]
+                          for label in ("hidden cell", "hidden cell never seen"))  # fmt: skip
+    assert filled.get_paths()[0].vertices[0].tolist() == [1.0, 0.0]
+    assert pale.get_paths()[0].vertices[0].tolist() == [2.0, 2.0]
+    assert to_hex(filled.get_facecolor()[0]) == ORANGE.lower()
+    assert to_hex(pale.get_facecolor()[0]) == "#ffffff"
+
+
+def test_the_last_route_is_drawn_only_if_it_was_planned_under_way():
+    once, again = (drive_figure(SCENARIO, PLAN, episode_of(Outcome.REACHED, replans=count), trace_of()).axes[0]
+                   for count in (0, 2))  # fmt: skip
+    assert absent(once, "last route")
+    assert the(again, "last route").get_xydata().tolist() == [[0.5, 2.5], [0.5, 0.5], [3.5, 0.5]]
+
+
+def test_a_robot_of_several_discs_is_drawn_along_its_heading():
+    robot = replace(jackal(), radius=0.25, disc_offsets=(-0.5, 0.5))
+    trace = trace_of()
+    trace = trace._replace(robot=trace.robot._replace(heading=np.full(5, np.pi / 2, np.float32)))
+    ax = drive_figure(SCENARIO, PLAN, episode_of(Outcome.STUCK), trace, robot=robot).axes[0]
+    discs = [patch for patch in ax.patches if isinstance(patch, Circle)][2:]
+    assert [disc.get_center() for disc in discs] == [pytest.approx((1.5, 1.0)), pytest.approx((1.5, 2.0))]
+    assert [disc.get_label() for disc in discs] == ["robot, end", "_"]
 
 
 @pytest.mark.parametrize("outcome", [Outcome.HIT_KNOWN, Outcome.HIT_UNKNOWN, Outcome.HIT_MOVER])
@@ -241,7 +277,7 @@ def test_bars_carry_wilson_intervals_beside_the_papers_rate():
 
 def test_a_film_shows_the_drive_and_holds_its_end(tmp_path):
     path = animate_drive(tmp_path / "drive.gif", SCENARIO, PLAN, episode_of(Outcome.REACHED), trace_of(), speed=0.1,
-                         robot_radius=0.25)  # fmt: skip
+                         robot=jackal())  # fmt: skip
     with Image.open(path) as film:
         assert film.n_frames == 4  # the start and three steps
         film.seek(3)

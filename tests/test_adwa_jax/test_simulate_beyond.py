@@ -1,0 +1,344 @@
+"""The closed loop under the rules beyond the paper: hidden cells, new routes, long robots, lanes side by side."""
+
+import math
+from dataclasses import replace
+from functools import partial
+
+import chex
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from adwa_jax.footprint import covering_discs
+from adwa_jax.learn import first_memory, in_range
+from adwa_jax.plan import plan
+from adwa_jax.presets import extended, paper, preset
+from adwa_jax.rollout import RobotState
+from adwa_jax.rules import Rules
+from adwa_jax.simulate import Outcome, clearances, control_step, drive, drive_lanes, start_episode, trace
+from scenarios.generators.paper import PaperSpec, generate
+from scenarios.hiding import hide
+from scenarios.padding import stack
+from tests.reference import distance as distance_reference
+from tests.reference import route as route_reference
+from tests.reference.dwa import square_distance
+from tests.test_adwa_jax.worlds import SHAPE, drawn, grid_of, random_map, scenario
+
+EXTENDED = extended()
+PAPER = paper()
+DT = EXTENDED.constants.behaviour.dt
+STEPS = 250  # rows kept of a trace; every time limit here is shorter
+ROOM = np.zeros(SHAPE, bool)
+NOTHING_HIDDEN = ROOM
+
+
+def task(occupied=ROOM, start=(1.5, 6.5), goal=(10.5, 6.5), hidden=NOTHING_HIDDEN, **more):
+    """Every task here has room for hidden cells, so that one compiled program serves all."""
+    return scenario(occupied, start, goal, hidden=hidden, **more)
+
+
+@partial(jax.jit, static_argnames="options")
+def whole_trace(world, constants, options):
+    known = plan(world.grid, world.start[:2], world.goal, constants, options.plan)
+    return trace(world, known, constants, options, STEPS)
+
+
+@partial(jax.jit, static_argnames="options")
+def alone(world, constants, options):
+    known = plan(world.grid, world.start[:2], world.goal, constants, options.plan)
+    return drive(world, known, constants, options)
+
+
+@partial(jax.jit, static_argnames="options")
+def side_by_side(worlds, constants, options):
+    known = jax.lax.map(lambda world: plan(world.grid, world.start[:2], world.goal, constants, options.plan), worlds)
+    return drive_lanes(worlds, known, constants, options)
+
+
+def traced(world, constants=EXTENDED.constants, options=EXTENDED.options):
+    episode, path = jax.device_get(whole_trace(world, constants, options))
+    return Outcome(int(episode.outcome)), episode, path
+
+
+def sensing(sensor_range, constants=EXTENDED.constants):
+    return replace(constants, behaviour=replace(constants.behaviour, sensor_range=sensor_range))
+
+
+def positions(world, path):
+    """[T + 1, 2]: the start and the place after every step."""
+    length = int(path.length)
+    return np.concatenate([np.asarray(world.start)[None, :2], np.stack([path.robot.x, path.robot.y], 1)[:length]])
+
+
+def cells(*pairs):
+    found = np.zeros(SHAPE, bool)
+    for row, column in pairs:
+        found[row, column] = True
+    return found
+
+
+BARRIER = cells(*[(row, 6) for row in range(3, 10)])
+MOVERS = ((9.0, 9.0, -0.3, -0.4, 0.3), (4.0, 8.0, 0.5, 0.1, 0.2))
+UNEQUAL = [
+    task(),
+    task(hidden=BARRIER),
+    task(drawn(*["............"] * 5, "#########...", *["............"] * 6), (1.5, 1.5), (1.5, 9.5),
+         squares=[(10.5, 5.5, 0.6)], movers=MOVERS),
+    task(drawn(".#."), (0.5, 0.5), (2.5, 0.5)),
+    task(squares=[(6.0, 6.5, 1.2)], movers=MOVERS[:1]),
+    task(time_limit=0.5),
+    task(random_map(4, (9, 9), 0.15), (0.5, 0.5), (8.5, 8.5), hidden=random_map(5, (9, 9), 0.1), movers=MOVERS),
+]  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def lanes():
+    """Every unequal task driven side by side."""
+    return jax.device_get(side_by_side(stack(UNEQUAL), *EXTENDED))
+
+
+@pytest.mark.parametrize("index", range(len(UNEQUAL)))
+def test_lane_equals_the_same_scenario_driven_alone_in_every_bit(lanes, index):
+    lane = jax.tree.map(lambda leaf: leaf[index], lanes)
+    chex.assert_trees_all_equal(lane, jax.device_get(alone(UNEQUAL[index], *EXTENDED)))
+
+
+def test_lanes_end_at_different_times_and_learn_different_things(lanes):
+    assert len(set(lanes.measures.time.tolist())) >= 5
+    assert len(set(lanes.replans.tolist())) >= 2
+    assert {Outcome.REACHED, Outcome.NO_PATH, Outcome.TIMEOUT} <= set(map(Outcome, lanes.outcome.tolist()))
+
+
+def test_lanes_do_not_depend_on_their_neighbours(lanes):
+    turned = jax.device_get(side_by_side(stack(UNEQUAL[::-1]), *EXTENDED))
+    chex.assert_trees_all_equal(jax.tree.map(lambda leaf: leaf[::-1], turned), lanes)
+
+
+@pytest.mark.parametrize("index", range(len(UNEQUAL)))
+def test_trace_tells_the_story_of_the_drive(lanes, index):
+    _, episode, path = traced(UNEQUAL[index])
+    chex.assert_trees_all_close(episode, jax.tree.map(lambda leaf: leaf[index], lanes), atol=1e-4)
+    assert int(path.length) == round(float(episode.measures.time) / DT)
+    assert all(np.isfinite(leaf).all() for leaf in jax.tree.leaves(path))
+    length = int(path.length)
+    np.testing.assert_array_equal(path.robot.x[length:], path.robot.x[max(length - 1, 0) : length].repeat(STEPS - length)
+                                  if length else np.full(STEPS, UNEQUAL[index].start[0]))
+
+
+def test_robot_obeys_its_limits_in_every_step():
+    robot = EXTENDED.constants.robot
+    for world in UNEQUAL[1:3]:
+        _, _, path = traced(world)
+        v, yaw_rate = (np.concatenate([[0.0], part[: int(path.length)]]) for part in (path.robot.v, path.robot.yaw_rate))
+        assert robot.v_min - 1e-6 <= v.min()
+        assert v.max() <= robot.v_max + 1e-6
+        assert abs(yaw_rate).max() <= robot.yaw_rate_max + 1e-6
+        assert abs(np.diff(v)).max() <= robot.acceleration * DT + 1e-5
+        assert abs(np.diff(yaw_rate)).max() <= robot.yaw_acceleration * DT + 1e-5
+
+
+# Hidden cells.
+
+
+def seen_along(world, places, sensor_range):
+    """Hidden cells within range of any of these places."""
+    seen = np.zeros(SHAPE, bool)
+    for place in places:
+        seen |= np.asarray(in_range(world, jnp.float32(place), jnp.float32(sensor_range)))
+    return seen
+
+
+@pytest.mark.parametrize("config", [EXTENDED, PAPER], ids=["extended", "paper"])
+def test_robot_without_a_map_has_seen_what_was_in_range_and_nothing_else(config):
+    hidden = cells((2, 2), (6, 6), (7, 6), (9, 3), (11, 11), (4, 9))
+    world = task(hidden=hidden)
+    _, _, path = traced(world, sensing(2.0, config.constants), config.options)
+    seen = seen_along(world, positions(world, path), 2.0)
+    # What comes into range with the last step may be left for a step that is not made.
+    before = seen_along(world, positions(world, path)[:-1], 2.0)
+    assert (before <= path.seen).all()
+    assert (path.seen <= seen).all()
+    assert path.seen.sum() >= 2
+    assert not path.seen[11, 11]
+
+
+def test_hidden_wall_is_driven_round_on_a_new_route():
+    outcome, episode, path = traced(task(hidden=BARRIER))
+    assert outcome is Outcome.REACHED
+    assert int(episode.replans) >= 1
+    assert path.seen[6, 6]
+    assert float(episode.measures.least_clearance) > 0
+    # Straight ahead it is 9 m; the last route goes past an end of the wall.
+    assert float(episode.measures.length) > 10
+    points = path.route.points[: int(path.route.count)]
+    np.testing.assert_allclose(points[-1], (10.5, 6.5), rtol=1e-6)
+
+
+def test_cells_seen_hold_for_what_is_decided_from_then_on():
+    # The paper's rules without a new route: once the cell ahead is seen, the robot passes it or stops before it.
+    outcome, episode, path = traced(task(hidden=cells((6, 6))), *PAPER)
+    assert path.seen[6, 6]
+    assert outcome in (Outcome.REACHED, Outcome.STUCK, Outcome.TIMEOUT)
+    assert float(episode.measures.least_clearance) > 0
+    assert int(episode.replans) == 0
+
+
+def blind(config):
+    return sensing(0.0, config.constants), config.options
+
+
+@pytest.mark.parametrize("config", [EXTENDED, PAPER], ids=["extended", "paper"])
+def test_unseen_hidden_cell_is_hit_unknowingly(config):
+    # Its side is at x = 6: the outline, 0.25 m ahead of the centre, gets there at 5.75.
+    outcome, episode, path = traced(task(hidden=cells((6, 6))), *blind(config))
+    assert outcome is Outcome.HIT_UNKNOWN
+    x = float(path.robot.x[int(path.length) - 1])
+    assert 5.75 < x <= 5.85 + 1e-3
+    assert float(episode.measures.least_clearance) == pytest.approx(5.75 - x, abs=1e-3)
+
+
+def test_hidden_cell_beside_the_way_is_passed_however_near_if_it_is_not_touched():
+    # Its side is at y = 7, the outline's at 6.5 + 0.25 where the robot drives along y = 6.5; then 0.01 m away.
+    hidden = cells((7, 6))
+    for y, expected in ((6.74, Outcome.REACHED), (6.76, Outcome.HIT_UNKNOWN)):
+        world = task(start=(1.5, y), goal=(10.5, y), hidden=hidden, heading=0.0)
+        config = sensing(0.0, replace(PAPER.constants, weights=replace(PAPER.constants.weights, clearance=0.0)))
+        outcome, _, path = traced(world, replace(config, robot=replace(config.robot, yaw_rate_max=1e-6)), PAPER.options)
+        assert outcome is expected, y
+        np.testing.assert_allclose(path.robot.y, y, atol=1e-4)
+
+
+def test_robot_that_stands_next_to_a_hidden_cell_it_sees_has_not_hit_it():
+    # 0.01 m away: nearer than the distance field, which it now holds, can tell.
+    world = task(start=(4.74, 6.5), goal=(2.5, 6.5), hidden=cells((6, 5)), heading=math.pi)
+    for config in (EXTENDED, PAPER):
+        outcome, episode, path = traced(world, *config)
+        assert path.seen[6, 5]
+        assert outcome in (Outcome.REACHED, Outcome.STUCK, Outcome.TIMEOUT)
+        assert 0 < float(episode.measures.least_clearance) <= 0.01 + 1e-4
+
+
+# New routes.
+
+
+def test_square_across_the_way_is_rounded_on_a_new_route():
+    world = task(drawn(*["............"] * 3, *["######......"] * 2, *["............"] * 7), squares=[(6.0, 6.5, 1.4)])
+    outcome, episode, path = traced(world, sensing(2.0))
+    assert outcome is Outcome.REACHED
+    assert int(episode.replans) >= 1
+    steps = positions(world, path)
+    clear = min(square_distance(x, y, (6.0, 6.5), 1.4) for x, y in steps)
+    assert clear > 0.25
+
+
+def test_target_never_runs_ahead_of_the_route_by_more_than_the_lookahead():
+    for world in UNEQUAL[:3]:
+        _, episode, path = traced(world)
+        if int(episode.replans):
+            continue  # the trace holds only the last route
+        route = path.route.points[: int(path.route.count)].astype(float).tolist()
+        for place, target in zip(positions(world, path), path.target[: int(path.length)], strict=False):
+            here = min(route_reference.feet(route, *map(float, place)))[1]
+            away = min(route_reference.feet(route, *map(float, target)))
+            assert away[0] < 1e-3
+            assert away[1] - here <= EXTENDED.constants.behaviour.lookahead + 0.05
+
+
+# What the robot hits.
+
+SCENES = 60
+
+
+def without_movers(index):
+    """A map like the paper's with squares on it; every other one shows the robot nothing beforehand."""
+    key = jax.random.fold_in(jax.random.key(11, impl="threefry2x32"), index)
+    spec = PaperSpec(cells=15, movers=0, density=(0.1, 0.2, 0.3)[index % 3], time_limit=60.0)
+    drawn_world = generate(key, spec)
+    if index % 2:
+        return hide(drawn_world)
+    return replace(drawn_world, hidden=np.zeros((15, 15), bool))
+
+
+def test_nothing_that_stands_is_ever_hit():
+    worlds = [without_movers(index) for index in range(SCENES)]
+    episodes = jax.device_get(side_by_side(stack(worlds), *EXTENDED))
+    outcomes = [Outcome(outcome) for outcome in episodes.outcome.tolist()]
+    assert not {Outcome.HIT_KNOWN, Outcome.HIT_UNKNOWN, Outcome.HIT_MOVER} & set(outcomes)
+    assert episodes.measures.least_clearance.min() > 0
+    assert outcomes.count(Outcome.REACHED) > 0.9 * SCENES
+    assert episodes.replans.max() > 0
+
+
+LENGTH, WIDTH = 0.8, 0.3
+ROD_RADIUS, ROD_OFFSETS = covering_discs(LENGTH, WIDTH, 3)
+
+
+def rod(config):
+    return replace(config.constants, robot=replace(config.constants.robot, radius=ROD_RADIUS, disc_offsets=ROD_OFFSETS))
+
+
+@partial(jax.jit, static_argnames="options")
+def clearances_of(world, x, y, heading, constants, options):
+    """To known squares, to what is unknown, to movers, of a robot placed there."""
+    known = plan(world.grid, world.start[:2], world.goal, constants, options.plan)
+    state = start_episode(world, known)._replace(robot=RobotState(x, y, heading, jnp.float32(0), jnp.float32(0)))
+    return clearances(state, world, known.field, constants, options)
+
+
+@pytest.mark.parametrize("heading", [0.0, 0.6, math.pi / 2, -2.0])
+def test_every_disc_is_judged_for_contact(heading):
+    occupied = cells((5, 8), (9, 4))
+    world = task(occupied, hidden=cells((7, 5)), squares=[(4.0, 4.0, 0.4)], movers=[(7.2, 7.6, 0.0, 0.0, 0.3)])
+    for x, y in ((6.5, 6.5), (7.3, 5.6), (5.4, 6.2)):
+        found = clearances_of(world, *map(jnp.float32, (x, y, heading)), rod(PAPER), PAPER.options)
+        centres = [(x + offset * math.cos(heading), y + offset * math.sin(heading)) for offset in ROD_OFFSETS]
+        known = min(distance_reference.distance(occupied, *centre) for centre in centres)
+        unknown = min(min(square_distance(*centre, (4.0, 4.0), 0.4),
+                          math.sqrt(distance_reference.squared_gap(*centre, 7, 5))) for centre in centres)
+        moving = min(math.dist(centre, (7.2, 7.6)) - 0.3 for centre in centres)
+        if known < 2:  # exact within the contact window; a lower bound beyond
+            assert float(found[0]) == pytest.approx(known - ROD_RADIUS, abs=1e-4)
+        assert float(found[0]) <= known - ROD_RADIUS + 1e-4
+        assert float(found[1]) == pytest.approx(unknown - ROD_RADIUS, abs=1e-4)
+        assert float(found[2]) == pytest.approx(moving - ROD_RADIUS, abs=1e-4)
+
+
+def test_long_robot_hits_with_its_ends_what_a_disc_would_miss():
+    # The robot stands at (1.5, 6.5); its front disc reaches 0.27 + 0.2 m ahead, a single disc of that size 0.2 m.
+    assert pytest.approx((0.2667, 0.2007), abs=1e-3) == (ROD_OFFSETS[-1], ROD_RADIUS)
+    world = task(hidden=cells((6, 2)), start=(1.58, 6.5), heading=0.0)
+    ahead, aside = (float(clearances_of(world, jnp.float32(1.58), jnp.float32(6.5), jnp.float32(heading), rod(PAPER),
+                                        PAPER.options)[1]) for heading in (0.0, math.pi / 2))
+    assert ahead == pytest.approx(0.42 - 0.2667 - 0.2007, abs=1e-3)
+    assert aside == pytest.approx(0.42 - 0.2007, abs=1e-3)
+    assert ahead < 0 < aside
+
+
+# Movers at the border.
+
+
+def test_movers_are_expected_to_turn_back_at_the_maps_own_border():
+    # On a map of 9 × 9 m in a padded grid a mover heads for the border at x = 9, where its disc of 0.5 m turns back at
+    # 8.5; the robot stands still at (7.5, 4.5). Without the rule it is expected to go on, away from the robot.
+    world = task(np.zeros((9, 9), bool), (7.5, 4.5), (1.5, 4.5), movers=[(8.4, 4.5, 0.5, 0.0, 0.4)], heading=math.pi)
+    clearance = {}
+    for name in ("border", "least_bad"):
+        constants, options = preset(Rules().only(name))
+        known = plan(world.grid, world.start[:2], world.goal, constants, options.plan)
+        step = jax.jit(control_step, static_argnames="options")
+        _, decision = step(start_episode(world, known), first_memory(world, known), world, known, constants,
+                           options=options)
+        clearance[name] = float(decision.candidates.clearance[0, 0])  # v = 0, over 2 s
+    assert clearance["least_bad"] == pytest.approx(8.45 - 7.5 - 0.65, abs=1e-4)  # its first point, after 0.1 s
+    # After 2 s it would be at 9.4: mirrored at 8.6, at 7.8, less 0.4 and 0.25.
+    assert clearance["border"] == pytest.approx(7.8 - 7.5 - 0.65, abs=1e-4)
+
+
+def test_changing_constants_and_tasks_does_not_retrace():
+    traced(UNEQUAL[0])
+    before = whole_trace._cache_size()
+    constants = jax.tree.map(lambda value: value * 1.01, EXTENDED.constants)
+    traced(UNEQUAL[1], constants)
+    traced(task(grid_of(ROOM).occupied.__array__(), (2.5, 2.5), (4.5, 4.5)), sensing(1.0))
+    assert whole_trace._cache_size() == before

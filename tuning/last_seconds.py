@@ -1,0 +1,123 @@
+"""How a drive ended: its last seconds around the robot, robot and movers in the same colour at the same time.
+
+Dimension letters: T points of time; M movers.
+"""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from adwa_jax.simulate import Outcome
+from scenarios.drawing import BLACK, BLUE, FONT, OCCUPIED, draw_ends, draw_map, draw_movers
+from tuning.figures import (
+    disc_centres,
+    draw_hidden_cells,
+    draw_last_route,
+    draw_outline,
+    draw_polyline,
+    draw_sensed_squares,
+    driven_path,
+    driven_ways,
+    last_heading,
+)
+from tuning.replay import Replay
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+ROOM = 1.5  # [m] shown around the driven path
+LEAST_HALF = 2.0  # [m] half the side of what is shown, at least
+ARROW = 1.0  # [s] of motion that an arrow stands for
+COLOURS = "cividis"  # equal steps in lightness: also for the colour-blind, and in grey
+IN_LEGEND = "#7C7B78"  # their middle
+
+
+def draw_last_seconds(driven: Replay, ax: "Axes", seconds: float = 4.0, title: str = "", y_down: bool = False) -> Any:
+    """Map, sensed and unsensed obstacles, planned path and last route; what was driven in the last `seconds`, movers
+    with their trails and an arrow for the way of the next second, the robot and its local target at the end.
+
+    Dots mark whole seconds. Returns what a colour bar of the time [s] needs, None for a robot that never drove: then
+    all of the map is shown.
+    """
+    scenario, trace, steps = driven.scenario, driven.trace, int(driven.trace.length)
+    draw_map(scenario.grid, ax, y_down)
+    ax.set_facecolor(OCCUPIED)  # beyond the map
+    draw_hidden_cells(scenario, trace, ax)
+    draw_sensed_squares(scenario, np.asarray(trace.known)[steps - 1] if steps else None, ax)
+    draw_ends(scenario.start[:2], scenario.goal, ax)
+    if int(driven.plan.key_point_count):
+        draw_polyline(np.asarray(driven.plan.key_points)[: int(driven.plan.key_point_count)], ax, "--", "planned path")
+    draw_last_route(driven.episode, trace, ax)
+    ax.set_title(title, fontsize=FONT - 1)
+    ax.set(xlabel="", ylabel="")
+    if not steps:
+        return None
+    first = max(steps - round(seconds / step_of(driven)), 0)
+    times = (np.arange(first, steps + 1) - steps) * step_of(driven)
+    path = driven_path(scenario, trace)[first:]
+    shades = {"cmap": COLOURS, "vmin": -seconds, "vmax": 0.0}
+    _draw_movers(driven, first, times, ax, shades)
+    shaded = _draw_trail(path, times, ax, shades, width=3.0, label="driven path")
+    _draw_robot(driven, path[-1], ax)
+    _crop(path, ax, y_down)
+    return shaded
+
+
+def step_of(driven: Replay) -> float:
+    """Control step [s] of a robot that drove."""
+    return float(driven.episode.measures.time) / int(driven.trace.length)
+
+
+def _draw_robot(driven: Replay, position: np.ndarray, ax: "Axes") -> None:
+    """Its discs and nose, the local target, and a cross where it was in contact."""
+    robot, heading = driven.robot, last_heading(driven.scenario, driven.trace)
+    radius = float(robot.radius)
+    draw_outline(disc_centres(position, heading, robot.disc_offsets), radius, ax, linewidth=1.6)
+    reach = max(map(float, robot.disc_offsets)) + radius
+    nose = position + reach * np.array([np.cos(heading), np.sin(heading)])
+    ax.plot(*np.stack([position, nose]).T, color=BLACK, linewidth=1.2, zorder=9)
+    target = np.asarray(driven.trace.target)[int(driven.trace.length) - 1]
+    ax.plot(*target[:, None], linestyle="none", marker="o", markersize=9, markerfacecolor="none",
+            markeredgecolor=BLACK, zorder=7, label="local target")
+    if driven.outcome in (Outcome.HIT_KNOWN, Outcome.HIT_UNKNOWN, Outcome.HIT_MOVER):
+        ax.plot(*position[:, None], linestyle="none", marker="x", markersize=8, color=BLACK, markeredgewidth=2.0,
+                zorder=9.5, label="collision")
+
+
+def _draw_movers(driven: Replay, first: int, times: np.ndarray, ax: "Axes", shades: dict[str, Any]) -> None:
+    """Where they are at the end, the way that led there, and where they were going."""
+    ways = driven_ways(driven.scenario, driven.trace)[first:]
+    draw_movers(ways[-1], np.asarray(driven.scenario.movers.radius), ax, "mover, end", alpha=0.7)
+    for way in np.swapaxes(ways, 0, 1):
+        _draw_trail(way, times, ax, shades, width=1.5)
+    velocity = np.asarray(driven.trace.movers.velocity)[int(driven.trace.length) - 1, : ways.shape[1]]
+    going = np.isfinite(ways[-1]).all(axis=1) & (np.hypot(*velocity.T) > 1e-3)
+    if going.any():
+        ax.quiver(*ways[-1][going].T, *(ARROW * velocity[going]).T, angles="xy", scale_units="xy", scale=1.0,
+                  color=BLUE, width=0.008, zorder=4.5)
+
+
+def _draw_trail(way: np.ndarray, times: np.ndarray, ax: "Axes", shades: dict[str, Any], width: float,
+                label: str = "_") -> Any:
+    """A line along a way [T, 2] in the colour of its times [T], a dot at every whole second; NaN is not drawn."""
+    from matplotlib.collections import LineCollection
+    from matplotlib.colors import Normalize
+
+    norm = Normalize(shades["vmin"], shades["vmax"])
+    segments = np.stack([way[:-1], way[1:]], axis=1)
+    shown = np.isfinite(segments).all(axis=(1, 2))
+    line = LineCollection(list(segments[shown]), array=times[1:][shown], cmap=shades["cmap"], norm=norm, colors=IN_LEGEND,
+                          linewidth=width, zorder=6, label=label, capstyle="round")  # fmt: skip
+    ax.add_collection(line, autolim=False)
+    whole = np.abs(times - np.rint(times)) < 0.5 * (times[1] - times[0]) - 1e-6
+    ax.scatter(*way[whole].T, c=times[whole], s=6.0 * width, edgecolors=BLACK, linewidths=0.5, zorder=6.2, **shades)
+    return line
+
+
+def _crop(path: np.ndarray, ax: "Axes", y_down: bool) -> None:
+    """Show a square that holds the path [T, 2] with room around it."""
+    low, high = path.min(axis=0), path.max(axis=0)
+    middle, half = (low + high) / 2, max(float((high - low).max()) / 2 + ROOM, LEAST_HALF)
+    ax.set_xlim(middle[0] - half, middle[0] + half)
+    ends = (middle[1] - half, middle[1] + half)
+    ax.set_ylim(*(ends[::-1] if y_down else ends))
