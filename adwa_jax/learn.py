@@ -146,15 +146,22 @@ def _with_new_route(memory: Memory, position: jax.Array, grid: Grid, scenario: S
     found = lax.cond(found.status == Status.FOUND, lambda: found, lambda: path_with(0.0))
     margin = behaviour.clearance_margin / grid.resolution
     kept = key_points(grid.occupied, found.path, found.path_cells, margin, options.plan.keypoint_rule)
-    index = jnp.arange(kept.cells.shape[0])
-    last = jnp.maximum(kept.count - 1, 0)
-    points = jnp.where((index >= last)[:, None], scenario.goal[None, :], centre_of(grid, kept.cells))
-    points = jnp.where((index == 0)[:, None], position[None, :], points)
-    count = jnp.maximum(kept.count, 2)
+    last = jnp.arange(kept.cells.shape[0]) >= kept.count - 1
+    points = jnp.where(last[:, None], scenario.goal[None, :], centre_of(grid, kept.cells))
     is_found = found.status == Status.FOUND
-    route = jax.tree.map(lambda new, old: jnp.where(is_found, new, old), route_through(points, count), memory.route)
+    route = jax.tree.map(lambda new, old: jnp.where(is_found, new, old),
+                         _from_here(points, kept.count, position, grid, margin), memory.route)  # fmt: skip
     return memory._replace(route=route, target=jnp.where(is_found, 1, memory.target),
                            replans=memory.replans + is_found.astype(jnp.int32))
+
+
+def _from_here(points: jax.Array, count: jax.Array, position: jax.Array, grid: Grid, margin: jax.Array) -> Route:
+    """From the robot to the second point, or by way of the first, its cell's centre, where that is not free."""
+    here, there = ((point - grid.origin) / grid.resolution for point in (position, points[jnp.minimum(1, count - 1)]))
+    direct = segment_free(grid.occupied, here, there, margin) | (count < 2)
+    by_way = jnp.concatenate([position[None, :], points[:-1]])
+    straight = jnp.concatenate([position[None, :], points[1:]])
+    return route_through(jnp.where(direct, straight, by_way), jnp.where(direct, jnp.maximum(count, 2), count + 1))
 
 
 def _nearest_free(blocked: jax.Array, cell: jax.Array) -> jax.Array:

@@ -168,7 +168,7 @@ def lanes_step(state: EpisodeState, memory: Memory, scenarios: Scenario, plans: 
 def take_in(state: EpisodeState, memory: Memory, scenario: Scenario, constants: Constants,
             options: Options) -> tuple[EpisodeState, Memory]:
     """Learn what was noticed."""
-    lost = state.lost >= _steps(constants.behaviour.lost_time, constants)
+    lost = is_lost(state, constants)
     known = _sensed(state, scenario, constants, options).square_known
     memory = learn(memory, _position(state), state.target, known, lost, scenario, constants, options)
     state = state._replace(target=memory.target, known=known, noticed=jnp.bool_(False),
@@ -258,8 +258,18 @@ def notices(state: EpisodeState, memory: Memory, scenario: Scenario, constants: 
         news |= jnp.any(in_range(scenario, _position(state), behaviour.sensor_range) & ~memory.seen)
     if options.rules.replan:
         news |= jnp.any(_sensed(state, scenario, constants, options).square_known & ~state.known)
-        news |= state.lost >= _steps(behaviour.lost_time, constants)
+        news |= is_lost(state, constants)
     return news
+
+
+def is_lost(state: EpisodeState, constants: Constants) -> jax.Array:
+    """[] bool: nothing of the route was in sight for `lost_time`, or the robot stays on the spot: every third of
+    `stuck_time`.
+    """
+    behaviour = constants.behaviour
+    still = state.step - state.anchor_step
+    stays = (still > 0) & (still % jnp.maximum(_steps(behaviour.stuck_time, constants) // 3, 1) == 0)
+    return stays | (state.lost >= _steps(behaviour.lost_time, constants))
 
 
 def next_target(target: jax.Array, position: jax.Array, points: jax.Array, count: jax.Array,

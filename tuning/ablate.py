@@ -65,7 +65,7 @@ class Row:
             "success_ci": list(wilson(successes, results.count)),
             **_named("difference", self.difference()),
             "other_outcome": None if self.base is None else int(np.sum(results.outcome != self.base.outcome)),
-            **results.outcomes(), "hit_while_stopped": int(results.measures["hit_while_stopped"].sum()),
+            **results.outcomes(), "hit_while_stopped": results.standing_hits(),
             "both_reached": None if self.base is None else int(np.sum(results.reached & self.base.reached)),
         }  # fmt: skip
         for measure in COMPARED:

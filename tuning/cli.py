@@ -1,4 +1,4 @@
-"""The command `adwa`: plan, evaluate, ablate, drive, suite make, suite show, demo.
+"""The command `adwa`: plan, evaluate, ablate, weights, drive, suite make, suite show, demo.
 
 Exit code 0: done; 1: ran, but found nothing; 2: bad input, said in one line.
 """
@@ -57,7 +57,7 @@ from tuning.planning import PlannedPath, as_json, plan_paths, planner_constants,
 from tuning.results import Results
 from tuning.sources import Source, Work, options_named, read_grid, read_queries, read_suite
 from tuning.suite_files import KINDS, suite_in
-from tuning.weights_file import parse_weight_rule
+from tuning.weights_file import parse_weight_rule, weights_text
 
 app = typer.Typer(
     add_completion=False, pretty_exceptions_enable=False,
@@ -225,6 +225,17 @@ def ablate_command(
     if not quiet:
         show(ablation_table(chosen, rows))
         print(f"wrote ablation.md, .json, .csv and .png in {out}")
+
+
+@app.command("weights")
+def weights_command(
+    preset: PresetOption = "paper",
+    robot: RobotOption = None,
+    v_max: SpeedOption = None,
+) -> None:
+    """Print a preset's constants as TOML, to change and to give back with --weights."""
+    config = configured(preset, Vehicle(robot, v_max))
+    print(weights_text(config.constants, config.options.rules), end="")
 
 
 @app.command("drive")

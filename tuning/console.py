@@ -69,8 +69,9 @@ def results_table(results: Results) -> Table:
     table.add_column("")
     table.show_header = False
     table.add_row("success rate", f"{summary['success_rate']:.1%}", f"95 %: {low:.1%} … {high:.1%} (Wilson)")
+    standing = f" ({results.standing_hits()} while the robot stood)"
     for name, count in summary["outcomes"].items():
-        table.add_row(name, str(count), f"{count / results.count:.1%}")
+        table.add_row(name, str(count), f"{count / results.count:.1%}" + standing * (name == "HIT_MOVER" and count > 0))
     table.add_section()
     if summary["feasible"] is not None:
         _add_feasible(summary["feasible"], results.count, table)

@@ -207,7 +207,7 @@ def _success(reports: list[SizeReport]) -> str:
 
 
 def _outcome(name: str, number: int, report: SizeReport) -> str:
-    standing = int(report.results.measures["hit_while_stopped"].sum())
+    standing = report.results.standing_hits()
     return f"{name} {number} ({standing} while the robot stood)" if name == "HIT_MOVER" else f"{name} {number}"
 
 

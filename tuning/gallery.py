@@ -180,4 +180,4 @@ def _index(groups: dict[Cause, Group], suite: Suite, results: Results, seconds: 
     for cause, group in groups.items():
         names = ", ".join(f"{suite.names[index]} (index {index})" for index in group.indices)
         lines += [f"\n## {cause.heading}\n", f"{cause.sentence}\n", f"![{cause.heading}]({cause.file}.png)\n", names]
-    return "\n".join(lines) + "\n"
+    return "\n".join(lines).rstrip() + "\n"

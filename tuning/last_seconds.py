@@ -106,8 +106,8 @@ def _draw_trail(way: np.ndarray, times: np.ndarray, ax: "Axes", shades: dict[str
     norm = Normalize(shades["vmin"], shades["vmax"])
     segments = np.stack([way[:-1], way[1:]], axis=1)
     shown = np.isfinite(segments).all(axis=(1, 2))
-    line = LineCollection(list(segments[shown]), array=times[1:][shown], cmap=shades["cmap"], norm=norm, colors=IN_LEGEND,
-                          linewidth=width, zorder=6, label=label, capstyle="round")  # fmt: skip
+    line = LineCollection(list(segments[shown]), array=times[1:][shown], cmap=shades["cmap"], norm=norm,
+                          colors=IN_LEGEND, linewidth=width, zorder=6, label=label, capstyle="round")
     ax.add_collection(line, autolim=False)
     whole = np.abs(times - np.rint(times)) < 0.5 * (times[1] - times[0]) - 1e-6
     ax.scatter(*way[whole].T, c=times[whole], s=6.0 * width, edgecolors=BLACK, linewidths=0.5, zorder=6.2, **shades)

@@ -44,6 +44,10 @@ class Results:
         counted = Counter(self.outcome.tolist())
         return {outcome.name: counted.get(int(outcome), 0) for outcome in Outcome}
 
+    def standing_hits(self) -> int:
+        """In how many scenarios a mover ran into the standing robot."""
+        return int(self.measures["hit_while_stopped"].sum())
+
     def means(self) -> dict[str, float | None]:
         """Mean of every measure over the successes (of `OVER_ALL` over all scenarios); None where there is none."""
         return {name: self._mean(name, values) for name, values in self.measures.items()}

@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.table import Table
 
 from adwa_jax.astar import search
-from adwa_jax.dwa import Decision, Guidance, decide
+from adwa_jax.dwa import Guidance, decide
 from adwa_jax.grid import cell_of
 from adwa_jax.heuristic_weight import weight_field
 from adwa_jax.obstacles import movers_at, sense
@@ -67,7 +67,7 @@ def decisions(name: str, preset: Preset, count: int) -> Timing:
 
     plans = jax.jit(lambda worlds: jax.lax.map(plan_one, worlds))(worlds)
 
-    def one(world: Scenario, planned: Any) -> Decision:
+    def one(world: Scenario, planned: Any) -> tuple[jax.Array, jax.Array, jax.Array]:
         target = planned.key_points[1]
         heading = jnp.arctan2(target[1] - world.start[1], target[0] - world.start[0])
         robot = RobotState(world.start[0], world.start[1], heading, jnp.float32(SPEED), jnp.float32(0.0))
@@ -76,12 +76,14 @@ def decisions(name: str, preset: Preset, count: int) -> Timing:
                        world.start[:2], constants.behaviour.sensor_range)
         route = route_through(planned.key_points, planned.key_point_count)
         guidance = Guidance(target, world.goal, ahead_of(route, jnp.int32(1)))
-        return decide(robot, guidance, planned.field, sensed, constants, options)
+        decision = decide(robot, guidance, planned.field, sensed, constants, options)
+        return decision.v, decision.yaw_rate, decision.candidates.admissible  # as the closed loop, no diagnostics
 
-    def describe(decided: Decision) -> dict[str, float]:
-        candidates = float(np.prod(decided.candidates.admissible.shape[1:]))
+    def describe(decided: tuple[jax.Array, jax.Array, jax.Array]) -> dict[str, float]:
+        admissible = np.asarray(decided[2])
+        candidates = float(np.prod(admissible.shape[1:]))
         return {"candidates": candidates, "candidate points": candidates * points_of(preset),
-                "admissible share": float(np.mean(decided.candidates.admissible))}  # fmt: skip
+                "admissible share": float(np.mean(admissible))}  # fmt: skip
 
     run = jax.jit(lambda worlds, plans: jax.vmap(one)(worlds, plans))
     return timed(f"DWA, {name}", "decisions", count, lambda: run(worlds, plans), describe=describe)
@@ -90,7 +92,7 @@ def decisions(name: str, preset: Preset, count: int) -> Timing:
 def points_of(preset: Preset) -> int:
     """At how many points a candidate's clearance is looked up, those of its braking included."""
     dwa, rules = preset.options.dwa, preset.options.rules
-    return (dwa.watch_steps if rules.long_watch else dwa.horizon_steps) + dwa.halt_steps * rules.stopping
+    return dwa.horizon_steps + dwa.watch_beyond * rules.long_watch + dwa.halt_steps * rules.stopping
 
 
 def episodes(count: int) -> Timing:

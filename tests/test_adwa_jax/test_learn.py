@@ -41,6 +41,11 @@ cells_in_range, cells_overlapped = jax.jit(in_range), jax.jit(overlapped)
 blocked, first = jax.jit(route_blocked), jax.jit(first_memory)
 
 
+def task(occupied=ROOM, start=(1.5, 6.5), goal=(10.5, 6.5), hidden=ROOM, **more):
+    """Every task here has room for hidden cells, so that one compiled program serves all."""
+    return scenario(occupied, start, goal, hidden=hidden, **more)
+
+
 def begin(world, constants=CONSTANTS):
     """What the robot remembers when it starts."""
     return first(world, planned(world.grid, world.start[:2], world.goal, constants, options=OPTIONS.plan))
@@ -254,12 +259,12 @@ def nearest(occupied, a, b):
                 for row, column in np.argwhere(occupied)), default=math.inf)
 
 
-ACROSS = scenario(ROOM, (1.5, 6.5), (10.5, 6.5), squares=[(6.0, 6.5, 1.0)])
+ACROSS = task(squares=[(6.0, 6.5, 1.0)])
 SQUARE_SENSED = jnp.array([True, False])
 
 
 def test_first_route_is_the_plans_and_ends_at_the_goal():
-    world = scenario(drawn("....", ".##.", "...."), (0.6, 1.4), (3.4, 1.6))
+    world = task(drawn("....", ".##.", "...."), (0.6, 1.4), (3.4, 1.6))
     memory = begin(world, replace(CONSTANTS, behaviour=replace(CONSTANTS.behaviour, clearance_margin=0.25)))
     points = np.asarray(memory.route.points)[: int(memory.route.count)]
     np.testing.assert_allclose(points, [(0.5, 1.5), (0.5, 0.5), (3.5, 0.5), (3.4, 1.6)], atol=1e-6)
@@ -306,7 +311,7 @@ GAP = drawn(*["......#....."] * 6, "............", *["......#....."] * 5)
 
 def test_without_a_way_round_the_old_route_stays():
     # A wall with one gap, and a square in it.
-    world = scenario(GAP, (1.5, 1.5), (10.5, 6.5), squares=[(6.5, 6.5, 0.3)])
+    world = task(GAP, (1.5, 1.5), (10.5, 6.5), squares=[(6.5, 6.5, 0.3)])
     memory = begin(world)
     assert length_of(memory.route) >= 3
     after = take_in(memory, (4.0, 5.0), world, target=2, known=SQUARE_SENSED)
@@ -317,7 +322,7 @@ def test_without_a_way_round_the_old_route_stays():
 
 def test_route_starts_in_the_nearest_free_cell_where_the_robots_own_is_taken():
     # The square overlaps the robot's cell, [2, 3] × [6, 7], without touching the robot at (2.1, 6.3).
-    world = scenario(ROOM, (1.5, 6.5), (10.5, 6.5), squares=[(2.8, 6.7, 0.3)])
+    world = task(squares=[(2.8, 6.7, 0.3)])
     after = take_in(begin(world), (2.1, 6.3), world, known=SQUARE_SENSED)
     assert int(after.replans) == 1
     np.testing.assert_allclose(after.route.points[0], (2.1, 6.3), rtol=1e-6)
@@ -328,7 +333,7 @@ def test_route_starts_in_the_nearest_free_cell_where_the_robots_own_is_taken():
 
 
 def test_robot_on_a_taken_goal_cell_still_gets_a_route_to_the_goal():
-    world = scenario(ROOM, (1.5, 6.5), (10.2, 6.2), squares=[(10.8, 6.8, 0.15)])
+    world = task(goal=(10.2, 6.2), squares=[(10.8, 6.8, 0.15)])
     after = take_in(begin(world), (5.0, 6.5), world, known=SQUARE_SENSED)
     np.testing.assert_allclose(after.route.points[length_of(after.route) - 1], (10.2, 6.2), rtol=1e-6)
 
@@ -336,7 +341,7 @@ def test_robot_on_a_taken_goal_cell_still_gets_a_route_to_the_goal():
 def test_hidden_wall_is_rounded_once_it_is_seen():
     wall = np.zeros(SHAPE, bool)
     wall[2:9, 6] = True
-    world = scenario(ROOM, (1.5, 6.5), (10.5, 6.5), hidden=wall)
+    world = task(hidden=wall)
     memory = begin(world)
     far = take_in(memory, (2.5, 6.5), world)  # 3.5 m away, beyond the range of 2 m
     assert (int(far.replans), int(far.seen.sum())) == (0, 0)
@@ -351,7 +356,7 @@ def test_new_routes_keep_clear_on_random_maps():
     for seed in range(12):
         occupied = random_map(seed, SHAPE, 0.12)
         row, column = np.argwhere(~occupied)[np.random.default_rng(seed).integers((~occupied).sum())]
-        world = scenario(occupied, (0.5, 0.5), (11.5, 11.5), squares=[(6.5, 5.5, 0.6), (5.5, 8.5, 0.3)])
+        world = task(occupied, (0.5, 0.5), (11.5, 11.5), squares=[(6.5, 5.5, 0.6), (5.5, 8.5, 0.3)])
         centre = (column + 0.5, row + 0.5)
         after = take_in(begin(world), centre, world, known=[True, True], lost=True)
         taken = np.asarray(known_grid(world, after.seen, jnp.array([True, True])).occupied)
@@ -364,7 +369,7 @@ def test_new_routes_keep_clear_on_random_maps():
 
 
 def test_changing_constants_and_worlds_does_not_retrace():
-    for world in (ACROSS, scenario(GAP, (1.5, 1.5), (10.5, 6.5), squares=[(6.5, 6.5, 0.3)])):
+    for world in (ACROSS, task(GAP, (1.5, 1.5), (10.5, 6.5), squares=[(6.5, 6.5, 0.3)])):
         take_in(begin(world), (4.0, 5.0), world)
     before = learned._cache_size()
     behaviour = replace(CONSTANTS.behaviour, sensor_range=3.0, route_margin=0.1, clearance_margin=0.3)

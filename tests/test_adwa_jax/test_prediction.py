@@ -164,8 +164,7 @@ def test_clearance_now_is_that_of_the_pose():
 
 def test_nothing_predicted_is_nan_and_gradients_are_finite():
     def total(start, mover):
-        known = sensed(squares=[((5.0, 7.0), 0.4)])._replace(position=jnp.broadcast_to(mover, (3, 2)),
-                                                             seen=jnp.array([True, False, False]))
+        known = sensed([((5.0, 7.0), 0.4)], [((8.0, 8.0), (0.0, 0.0), 0.2)], capacity=1)._replace(position=mover[None])
         found = predict(start, random_profiles(2), HORIZON, 2, scene_field(2), known, ROD, WARY, True, jnp.float32(0.1))
         return sum(jnp.sum(leaf) for leaf in jax.tree.leaves(found))
 

@@ -14,11 +14,12 @@ import pytest
 from PIL import Image
 from typer.testing import CliRunner
 
+from adwa_jax.presets import paper
 from adwa_jax.simulate import Outcome
 from scenarios.errors import InputError
 from scenarios.suite import SUITE_NAMES, save_suite
 from tests.test_tuning.worlds import BANDS, mixed_suite, part_of
-from tuning import cli, console
+from tuning import ablate, cli, console
 from tuning.intervals import wilson
 
 SUITE = part_of(mixed_suite(), [1, 2, 3, 4, 5])  # those of one padded shape
@@ -103,6 +104,8 @@ def write_weights():
     toml("negative.toml", **{**WEIGHTS, "clearance": -0.4})
     toml("string.toml", **{**WEIGHTS, "clearance": '"0.4"'})
     toml("list.toml", **{**WEIGHTS, "clearance": "[0.4]"})
+    toml("progress.toml", **WEIGHTS, progress=1.0)
+    toml("zero.toml", **dict.fromkeys(WEIGHTS, 0))
     toml("dense.toml", **WEIGHTS, **{**RULE, "dense_base": 0.9})
     toml("sparse.toml", **WEIGHTS, **{**RULE, "sparse_base": 0.9})
 
@@ -118,6 +121,8 @@ def write_suites():
     header = json.loads(arrays["header"].tobytes()) | {"version": 99}
     np.savez("old.npz", **{**arrays, "header": np.frombuffer(json.dumps(header).encode(), np.uint8)})
     Path("worlds").mkdir()
+    Path("table.csv").write_text("name,length\na,1\n")
+    Path("words.txt").write_text("Dear all\n")
     os.mkfifo("pipe")
 
 
@@ -187,7 +192,7 @@ class TestPlan:
     def test_a_table_is_printed_and_a_file_written(self, adwa, tmp_path):
         code, out, err = adwa(*PLAN, "--json", tmp_path / "new" / "plan.json")
         assert (code, err) == (0, "")
-        assert "1 FOUND" in out
+        assert "bands.map: 1 FOUND" in out
         assert "9.0000" in out
         assert strict_json((tmp_path / "new" / "plan.json").read_text())[0]["status"] == "FOUND"
 
@@ -354,6 +359,59 @@ class TestEvaluate:
             assert all(np.array_equal(a[name], b[name]) for name in a.files)
 
 
+    def test_the_extended_planner_drives_another_robot_without_a_map(self, adwa):
+        robot = ("--preset", "extended", "--robot", "jackal", "--v-max", 1.5, "--sensor-range", 3, "--sensed-only")
+        code, out, err = adwa("evaluate", "--suite-file", "some.suite", "--count", 1, *robot, "--json", "-")
+        assert err in ("", "adwa: none of the 1 scenarios reached its goal; see their outcomes\n")
+        found = strict_json(out)
+        assert (found["suite"], found["count"]) == ("mixed-sensed", 1)
+        assert found["scenarios"][0]["optimal_length"] < 8.5  # the wall is not on its map
+        assert code == (0 if found["outcomes"]["REACHED"] else 1)
+
+    def test_feasible_tells_what_is_proven_of_each_scenario(self, adwa):
+        code, out, _ = adwa(*EVALUATE, "--feasible", "--json", "-")
+        assert code == 0
+        found = strict_json(out)
+        labels = {row["name"]: row["feasibility"] for row in found["scenarios"]}
+        assert (labels["open"], labels["walled"], labels["brief"]) == ("POSSIBLE", "IMPOSSIBLE", "IMPOSSIBLE")
+        assert found["feasible"]["IMPOSSIBLE"] == list(labels.values()).count("IMPOSSIBLE")
+        kept = found["feasible"]["not_impossible"]
+        assert kept["count"] == 5 - found["feasible"]["IMPOSSIBLE"]
+        assert kept["success_rate"] == found["outcomes"]["REACHED"] / kept["count"]
+        _, out, _ = adwa(*EVALUATE, "--feasible")
+        assert re.search(rf"success of the {kept['count']} not impossible +\d+\.\d%", out)
+
+    def test_a_gallery_pictures_the_failures(self, adwa, tmp_path):
+        assert adwa(*EVALUATE, "--gallery", tmp_path / "new", "-q") == (0, "", "")
+        assert "## No path" in (tmp_path / "new" / "gallery.md").read_text()
+        assert (tmp_path / "new" / "no_path.png").stat().st_size > 0
+
+
+class TestAblateAndWeights:
+    def test_rows_are_told_as_they_come_and_written_to_a_folder(self, adwa, tmp_path, monkeypatch):
+        monkeypatch.setattr(ablate, "preset", lambda rules: paper())
+        command = ("ablate", "--suite-file", "some.suite", "--rule", "replan", "--rule", "replan", "--out")
+        code, out, err = adwa(*command, tmp_path / "new")
+        assert code == 0
+        names = ["paper", "extended", "extended without replan", "paper with replan"]
+        assert [line.split(":")[0] for line in err.splitlines()] == names
+        assert "5 scenarios, each with every configuration" in out
+        assert out.splitlines()[-1] == f"wrote ablation.md, .json, .csv and .png in {tmp_path / 'new'}"
+        rows = strict_json((tmp_path / "new" / "ablation.json").read_text())["rows"]
+        assert [row["configuration"] for row in rows] == names
+        assert [row["difference"] for row in rows] == [None, 0.0, 0.0, 0.0]
+        assert (tmp_path / "new" / "ablation.png").stat().st_size > 0
+        assert adwa(*command, tmp_path / "new", "-q") == (0, "", "")
+
+    def test_a_preset_is_printed_as_a_file_of_weights(self, adwa, tmp_path):
+        for arguments in ((), ("--preset", "extended"), ("--preset", "extended", "--robot", "jackal", "--v-max", 1)):
+            code, out, err = adwa("weights", *arguments)
+            assert (code, err) == (0, "")
+            (tmp_path / "weights.toml").write_text(out)
+            again = ("--weights", tmp_path / "weights.toml")
+            assert adwa("evaluate", "--suite", "none", *arguments, *again)[2].startswith("adwa: --suite: 'none'; ")
+
+
 class TestDriveAndSuite:
     def test_drive_writes_a_picture_and_an_animation_and_tells_what_evaluate_found(self, adwa, tmp_path):
         code, out, err = adwa("drive", "--suite-file", "some.suite", "--index", 3, "--figure", tmp_path / "d.png",
@@ -458,6 +516,9 @@ MISTAKES = {
     "0-byte suite": (("evaluate", "--suite-file", "zero.suite"), "zero.suite", "0 bytes", "make it again"),
     "cut suite": (("evaluate", "--suite-file", "cut.suite"), "cut.suite", "cut off", "give a file"),
     "suite without scenarios": (("evaluate", "--suite-file", "hollow.suite"), "mixed", "0 scenarios", "make it again"),
+    "table that is no suite": (("evaluate", "--suite-file", "table.csv"), "table.csv:1", "no column", "check that"),
+    "words that are no tracks": (("evaluate", "--suite", "words.txt"), "words.txt:1", "'Dear'", "mend"),
+    "no suite of such a name": (("drive", "--suite-file", "gone"), "gone", "it must be a saved suite", "check the name"),
     "older suite": (("evaluate", "--suite-file", "old.npz"), "old.npz", "version 99", "make it again"),
     "older suite to show": (("suite", "show", "old.npz"), "old.npz", "version 99", "make it again"),
     "folder without worlds": (("evaluate", "--suite-file", "worlds"), "worlds", "no .world", "name the folder"),
@@ -473,6 +534,15 @@ MISTAKES = {
     "limit of a sheet": (("suite", "show", "some.suite", "--limit", 0), "--limit", "0", "draw at least one"),
     "obstacles": (("evaluate", "--map", "all.png", "--unknown-obstacles", -1), "--unknown-obstacles", "-1", "correct"),
     "movers": (("evaluate", "--map", "all.png", "--movers", 10**9), "--movers", str(10**9), "correct"),
+    "unknown robot": ((*EVALUATE, "--robot", "tank"), "--robot", "'tank'", "choose one"),
+    "no speed": ((*EVALUATE, "--v-max", 0), "--v-max", "0", "correct it"),
+    "too fast": (("ablate", *EVALUATE[1:], "--v-max", 11), "--v-max", "11", "correct it"),
+    "blind": (("drive", *EVALUATE[1:], "--sensor-range", 0), "--sensor-range", "0", "correct it"),
+    "no disc": ((*EVALUATE, "--robot", "jackal", "--feasible"), "--feasible", "2 discs", "--robot disc"),
+    "gallery is a file": ((*EVALUATE, "--gallery", "bands.map"), "--gallery", "bands.map", "name a folder"),
+    "unknown rule": (("ablate", *EVALUATE[1:], "--rule", "luck"), "--rule", "'luck'", "choose among"),
+    "ablation into a file": (("ablate", *EVALUATE[1:], "--out", "bands.map"), "--out", "bands.map", "name a folder"),
+    "no suite to ablate": (("ablate",), "--suite, --suite-file, --map", "0 given", "give one"),
     "no room on the map": (("evaluate", "--map", "one.png"), "one.png", "no two connected cells", "a smaller radius"),
     # weights
     "no such weights": ((*EVALUATE, "--weights", "gone.toml"), "gone.toml", "No such file", "name an existing one"),
@@ -482,6 +552,8 @@ MISTAKES = {
     "negative weight": ((*EVALUATE, "--weights", "negative.toml"), "negative.toml", "clearance = -0.4", "correct it"),
     "string weight": ((*EVALUATE, "--weights", "string.toml"), "string.toml", "clearance = '0.4'", "without quotes"),
     "list weight": ((*EVALUATE, "--weights", "list.toml"), "list.toml", "clearance = [0.4]", "without quotes"),
+    "weight without effect": ((*EVALUATE, "--weights", "progress.toml"), "progress.toml", "progress", "--preset ext"),
+    "zero weights": ((*EVALUATE, "--weights", "zero.toml"), "zero.toml", "all 0", "raise one"),
     "dense constants": ((*EVALUATE, "--weights", "dense.toml"), "dense.toml", "must be < 1", "lower dense_base"),
     "sparse constants": ((*EVALUATE, "--weights", "sparse.toml"), "sparse.toml", "0.9", "raise it"),
     # typer's own
@@ -508,6 +580,13 @@ def test_a_mistake_is_one_line_with_place_value_and_remedy_and_exit_2(adwa, mist
         assert fragment in err
 
 
+def test_a_film_that_cannot_be_written_is_refused_before_the_drive(adwa, monkeypatch):
+    monkeypatch.setattr("matplotlib.animation.FFMpegWriter.isAvailable", lambda: False)
+    code, out, err = adwa("drive", "--suite-file", "gone", "--animation", "d.mp4")
+    assert (code, out) == (2, "")
+    assert err == "adwa: d.mp4: .mp4 is written by ffmpeg, which is not on the PATH; install it or write a .gif\n"
+
+
 def test_a_map_too_large_for_exact_costs_is_refused_by_name(adwa, tmp_path):
     image(tmp_path / "huge.png", np.full((3000, 3000), 255))
     image(tmp_path / "long.png", np.full((1, 20_000), 255))
@@ -528,14 +607,17 @@ def test_without_a_command_the_help_is_shown(adwa):
 
 def test_help_names_the_suites_and_every_option_of_the_contract():
     text = {}
-    for command in ("plan", "evaluate"):
+    for command in ("plan", "evaluate", "ablate"):
         output = CliRunner().invoke(cli.app, [command, "--help"]).output
         text[command] = " ".join(re.sub("[^-a-zA-Z0-9]", " ", output).split())  # without the frame of the help
     for option in ("map", "start", "goal", "scen", "limit", "planner", "scope", "weight-rule", "robot-radius",
                    "unknown", "json", "figure"):  # fmt: skip
         assert f"--{option} " in text["plan"]
-    for option in ("suite", "suite-file", "map", "count", "seed", "preset", "weights", "json", "out"):
+    for option in ("suite", "suite-file", "map", "count", "seed", "preset", "weights", "json", "out", "robot", "v-max",
+                   "sensor-range", "sensed-only", "feasible", "gallery"):  # fmt: skip
         assert f"--{option} " in text["evaluate"]
+    for option in ("suite", "suite-file", "map", "count", "seed", "rule", "robot", "out"):
+        assert f"--{option} " in text["ablate"]
     for name in SUITE_NAMES:
         assert name in text["evaluate"]
 

@@ -123,6 +123,11 @@ def test_every_program_is_compiled_once(together):
                                            for scenario in SUITE.scenarios}) == 2  # fmt: skip
 
 
+def test_a_suite_without_scenarios_is_refused():
+    with pytest.raises(ValueError, match=r"^mixed: 0 scenarios; there must be at least one; "):
+        evaluate(part_of(SUITE, []), paper())
+
+
 def test_a_batch_follows_from_its_scenario_alone():
     batches = {name: batch_of(scenario, paper().constants, paper().options)
                for name, scenario in zip(SUITE.names, SUITE.scenarios, strict=True)}  # fmt: skip

@@ -1,8 +1,9 @@
 import math
 
 import pytest
+from scipy import stats
 
-from tuning.intervals import Z95, mean_interval, wilson
+from tuning.intervals import Z95, mean_interval, paired_difference, small_sample_interval, student, wilson
 
 
 def test_wilson_of_95_in_100_by_hand():
@@ -46,3 +47,46 @@ def test_mean_interval_of_few_values():
     assert mean_interval([]) == (0.0, 0.0, 0.0)
     assert mean_interval([2.5]) == (2.5, 2.5, 2.5)
     assert mean_interval([2.5, 2.5, 2.5]) == (2.5, 2.5, 2.5)
+
+
+@pytest.mark.parametrize(("table", "expected"), [
+    # Cavo et al. 2012, in Fagerland, Lydersen and Laake: Statistical Analysis of Contingency Tables (2017), chapter 8.
+    ((59, 6, 16, 80), (-0.0621, -0.1186, -0.0046)),
+    # By hand: no correlation where a margin is empty, and Wilson's upper limit of 0 in 54 is z² / (54 + z²).
+    ((0, 0, 0, 54), (0.0, -(Z95**2) / (54 + Z95**2), Z95**2 / (54 + Z95**2))),
+])  # fmt: skip
+def test_paired_differences_of_known_tables(table, expected):
+    assert paired_difference(*table) == pytest.approx(expected, abs=5e-5)
+
+
+def test_a_paired_difference_turns_round_with_its_two_sides():
+    difference, low, high = paired_difference(40, 13, 4, 9)
+    assert paired_difference(40, 4, 13, 9) == pytest.approx((-difference, -high, -low))
+    assert difference == pytest.approx(9 / 66)
+    assert low < difference < high
+
+
+def test_pairs_that_mostly_agree_tell_more_than_the_two_rates_alone():
+    """φ is (80·16 − 2·2 − 50) / √(82·18·82·18), and the sides are those of Wilson's intervals of 82 in 100 twice."""
+    _, low, high = paired_difference(80, 2, 2, 16)
+    below, above = 0.82 - wilson(82, 100)[0], wilson(82, 100)[1] - 0.82
+    phi = (80 * 16 - 4 - 50) / (82 * 18)
+    assert -low == pytest.approx(high) == pytest.approx(math.sqrt(below**2 - 2 * phi * below * above + above**2))
+    assert high < 0.5 * math.hypot(below, above)
+
+
+def test_no_difference_is_exactly_none():
+    assert paired_difference(30, 0, 0, 10)[0] == 0.0
+    assert paired_difference(0, 1, 0, 0)[2] == 1.0
+
+
+def test_students_points_are_scipys():
+    for freedom in (1, 2, 3, 4, 5, 9, 30, 1000):
+        assert student(freedom) == pytest.approx(stats.t.ppf(0.975, freedom), rel=0.0013)
+
+
+def test_the_interval_of_a_small_sample_is_students():
+    mean, low, high = small_sample_interval([1.0, 2.0, 3.0, 6.0])
+    assert (mean, high - mean) == (3.0, pytest.approx(3.182 * math.sqrt(14 / 3 / 4), rel=0.0013))
+    assert low == pytest.approx(6.0 - high)
+    assert small_sample_interval([2.5]) == (2.5, 2.5, 2.5)

@@ -1,11 +1,14 @@
+from dataclasses import fields, replace
+
 import numpy as np
 import pytest
 
 from adwa_jax.heuristic_weight import WeightRule
-from adwa_jax.presets import paper
+from adwa_jax.presets import extended, paper, preset
+from adwa_jax.rules import EVERY_RULE, Rules
 from adwa_jax.score import ScoreWeights
 from scenarios.errors import InputError
-from tuning.weights_file import load_weights, parse_weight_rule
+from tuning.weights_file import NEEDS, in_use, load_weights, parse_weight_rule, weights_text
 
 SCORE = {"local_heading": 0.4, "clearance": 0.25, "velocity": 0.6, "global_heading": 0}
 RULE = {"dense_base": 0.5, "dense_gain": 0.5, "sparse_base": 1.25, "sparse_gain": 0.5}
@@ -96,6 +99,59 @@ def test_what_is_not_toml_is_refused(tmp_path, content):
     path = tmp_path / "weights.toml"
     path.write_bytes(content)
     assert "write lines such as: clearance = 0.4" in refusal(path)
+
+
+def beyond_paper(written, rules, **values):
+    config = preset(rules)
+    return load_weights(written(**values), config.constants, rules)
+
+
+def test_constants_of_the_rules_in_use_may_be_given_one_by_one(written):
+    loaded = beyond_paper(written, EVERY_RULE, contact_time=2.5, lookahead=3, mover_margin=0.125)
+    expected = extended().constants
+    assert loaded == replace(expected, weights=replace(expected.weights, contact_time=2.5),
+                             behaviour=replace(expected.behaviour, lookahead=3.0, mover_margin=0.125))  # fmt: skip
+
+
+def test_distances_of_the_papers_method_may_be_given_too(written):
+    loaded = load_weights(written(**SCORE, clearance_cap=0.75, clearance_margin=0.5), paper().constants)
+    assert (loaded.behaviour.clearance_cap, loaded.behaviour.clearance_margin) == (0.75, 0.5)
+
+
+@pytest.mark.parametrize(("key", "rule"), NEEDS.items())
+def test_a_constant_without_its_rule_is_refused(written, key, rule):
+    message = refusal(written(**SCORE, **{key: 0.5}))
+    assert message == (f": {key}: without effect; the preset's rule '{rule}' is off; remove it, or choose "
+                       "--preset extended")
+    beyond_paper(written, Rules().only(rule), **({} if rule == "progress" else SCORE), **{key: 0.5})
+
+
+def test_a_term_that_progress_replaces_is_refused(written):
+    with pytest.raises(InputError, match=r"velocity: without effect; .* 'progress' .*; remove it"):
+        beyond_paper(written, EVERY_RULE, velocity=0.5)
+
+
+def test_weights_that_are_all_zero_are_refused(written):
+    message = refusal(written(**dict.fromkeys(SCORE, 0)))
+    assert message == (": local_heading, clearance, velocity, global_heading: all 0; at least one weight must be above "
+                       "0; raise one")
+
+
+def test_a_distance_that_must_be_positive_is_refused(written):
+    assert refusal(written(**SCORE, clearance_cap=0)) == ": clearance_cap = 0: must be positive; raise it"
+
+
+@pytest.mark.parametrize("rules", [Rules(), EVERY_RULE, Rules().only("reverse")])
+def test_what_is_written_is_read_back_to_the_same_numbers(tmp_path, rules):
+    constants = preset(rules).constants
+    constants = replace(constants, weights=replace(constants.weights, clearance=1 / 3))
+    (tmp_path / "weights.toml").write_text(weights_text(constants, rules))
+    loaded = load_weights(tmp_path / "weights.toml", paper().constants, rules)
+    for part in ("weights", "weight_rule", "behaviour"):
+        for field in fields(getattr(constants, part)):
+            if in_use(field.name, rules):
+                given, again = (np.float32(getattr(getattr(each, part), field.name)) for each in (constants, loaded))
+                assert given == again, field.name
 
 
 def test_a_file_that_is_not_there_and_a_folder_are_refused(tmp_path):
