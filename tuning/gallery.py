@@ -135,9 +135,8 @@ def sheet(cause: Cause, group: Group, suite: Suite, seconds: float = SECONDS, y_
         shaded = draw_last_seconds(driven, tile, seconds, title, y_down) or shaded
     for tile in tiles[count:]:
         tile.set_axis_off()
-    figure.suptitle(f"{suite.name}: {cause.heading.lower()}, {count} of {len(group.indices)}", fontsize=FONT + 2)
-    figure.supxlabel("x [m]", fontsize=FONT)
-    figure.supylabel("y [m]", fontsize=FONT)
+    heading = f"{suite.name}: {cause.heading.lower()}, {count} of {len(group.indices)}"
+    figure.suptitle(f"{heading} (x and y in metres)", fontsize=FONT + 2)
     figure_legend(figure, tiles[:count])
     if shaded is not None:
         bar = figure.colorbar(shaded, ax=tiles, shrink=0.6, pad=0.01)

@@ -29,7 +29,6 @@ ROOM = 1.5  # [m] shown around the driven path
 LEAST_HALF = 2.0  # [m] half the side of what is shown, at least
 ARROW = 1.0  # [s] of motion that an arrow stands for
 COLOURS = "cividis"  # equal steps in lightness: also for the colour-blind, and in grey
-IN_LEGEND = "#7C7B78"  # their middle
 
 
 def draw_last_seconds(driven: Replay, ax: "Axes", seconds: float = 4.0, title: str = "", y_down: bool = False) -> Any:
@@ -57,7 +56,8 @@ def draw_last_seconds(driven: Replay, ax: "Axes", seconds: float = 4.0, title: s
     path = driven_path(scenario, trace)[first:]
     shades = {"cmap": COLOURS, "vmin": -seconds, "vmax": 0.0}
     _draw_movers(driven, first, times, ax, shades)
-    shaded = _draw_trail(path, times, ax, shades, width=3.0, label="driven path")
+    shaded = _draw_trail(path, times, ax, shades, width=3.0)
+    shaded.set_label("driven path")
     _draw_robot(driven, path[-1], ax)
     _crop(path, ax, y_down)
     return shaded
@@ -97,8 +97,7 @@ def _draw_movers(driven: Replay, first: int, times: np.ndarray, ax: "Axes", shad
                   color=BLUE, width=0.008, zorder=4.5)
 
 
-def _draw_trail(way: np.ndarray, times: np.ndarray, ax: "Axes", shades: dict[str, Any], width: float,
-                label: str = "_") -> Any:
+def _draw_trail(way: np.ndarray, times: np.ndarray, ax: "Axes", shades: dict[str, Any], width: float) -> Any:
     """A line along a way [T, 2] in the colour of its times [T], a dot at every whole second; NaN is not drawn."""
     from matplotlib.collections import LineCollection
     from matplotlib.colors import Normalize
@@ -107,7 +106,8 @@ def _draw_trail(way: np.ndarray, times: np.ndarray, ax: "Axes", shades: dict[str
     segments = np.stack([way[:-1], way[1:]], axis=1)
     shown = np.isfinite(segments).all(axis=(1, 2))
     line = LineCollection(list(segments[shown]), array=times[1:][shown], cmap=shades["cmap"], norm=norm,
-                          colors=IN_LEGEND, linewidth=width, zorder=6, label=label, capstyle="round")
+                          linewidth=width, zorder=6, capstyle="round")
+    line.update_scalarmappable()  # for the legend, which is made before anything is drawn
     ax.add_collection(line, autolim=False)
     whole = np.abs(times - np.rint(times)) < 0.5 * (times[1] - times[0]) - 1e-6
     ax.scatter(*way[whole].T, c=times[whole], s=6.0 * width, edgecolors=BLACK, linewidths=0.5, zorder=6.2, **shades)

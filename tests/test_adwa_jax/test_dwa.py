@@ -251,7 +251,8 @@ def test_wrap_is_the_short_way_round(angle, wrapped):
 
 
 @pytest.mark.parametrize("changed", [{"v_samples": 0}, {"yaw_rate_samples": 0}, {"horizon_steps": 0},
-                                     {"v_samples": 2.5}, {"normalisation": "softmax"}])
+                                     {"v_samples": 2.5}, {"normalisation": "softmax"}, {"stride": 0},
+                                     {"turn_step": 0}, {"halt_steps": 0}, {"watch_beyond": -1}])
 def test_nonsense_options_are_refused(changed):
     with pytest.raises(ValueError, match=next(iter(changed))):
         DwaOptions(**changed)

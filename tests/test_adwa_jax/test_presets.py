@@ -32,6 +32,7 @@ def test_constants_are_leaves_and_options_are_static():
 @pytest.mark.parametrize(("field", "value"), [
     ("dt", 0.0), ("clearance_cap", 0.0), ("sensor_range", -1.0), ("stuck_time", float("nan")),
     ("danger_clearance", float("inf")), ("keypoint_tolerance", "1.0"), ("clearance_margin", -0.1),
+    ("static_margin", -0.01), ("mover_growth", float("nan")), ("mover_cap", 0.0), ("lookahead", 0.0),
 ])
 def test_nonsense_behaviour_is_refused_by_name(field, value):
     with pytest.raises(ValueError, match=field):

@@ -60,7 +60,7 @@ def test_options_tell_rules_apart():
     assert len({hash(Options(rules=Rules().only(name))) for name in RULE_NAMES}) == len(RULE_NAMES)
 
 
-@pytest.mark.parametrize("name", ["second_phase", "border", "carrot", "least_bad"])
+@pytest.mark.parametrize("name", ["second_phase", "border", "least_bad"])
 def test_rules_without_constants_change_nothing_but_themselves(name):
     config = preset(Rules().only(name))
     assert config.constants == paper().constants
@@ -98,7 +98,8 @@ def test_constants_of_rules_that_are_off_change_no_bit_of_a_decision():
     constants = paper().constants
     odd = replace(
         constants,
-        weights=replace(constants.weights, progress=9.0, on_route=8.0, contact_time=7.0, mover_clearance=6.0, forward=5.0),
+        weights=replace(constants.weights, progress=9.0, on_route=8.0, contact_time=7.0, mover_clearance=6.0,
+                        forward=5.0),
         behaviour=replace(constants.behaviour, static_margin=0.5, mover_margin=0.6, mover_growth=0.7, mover_cap=0.8,
                           lookahead=0.9, route_margin=1.0, lost_time=9.0),
     )  # fmt: skip
@@ -116,14 +117,14 @@ TOWARDS_WALL = sensed(squares=[((8.5, 6.0), 1.0)])  # its side is at x = 7.5
 def test_rule_ramp_predicts_what_the_robot_can_come_to():
     # From rest the paper's fastest candidate is 0.2 m/s for ever; a ramp reaches 1 m/s within half a second.
     assert choose(Rules(), state(6, 6, 0)).candidates.terms.global_heading.shape == (11, 21)
-    found = choose(Rules().only("ramp"), state(6, 6, 0), TOWARDS_WALL)
+    wall = sensed(squares=[((9.0, 6.0), 1.0)])
+    found = choose(Rules().only("ramp"), state(6, 6, 0), wall)
     np.testing.assert_allclose(found.candidates.v[-1], 0.2, rtol=1e-5)
     config = preset(Rules().only("ramp"))
     steps = config.options.dwa.horizon_steps * config.options.dwa.stride
     reach = 0.1 * (0.2 + 0.4 + 0.6 + 0.8) + 0.1 * (steps - 4)  # 1 m/s from the fifth step on
     straight = config.options.dwa.yaw_rate_samples // 2
-    assert reach + 0.25 < 1.5
-    assert found.candidates.clearance[-1, straight] == pytest.approx(1.5 - reach - 0.25, abs=1e-3)
+    assert found.candidates.clearance[-1, straight] == pytest.approx(2.0 - reach - 0.25, abs=1e-3)
 
 
 def test_rule_second_phase_adds_candidates_that_change_their_mind():
@@ -158,7 +159,8 @@ def test_rule_stopping_admits_what_can_stop_before_a_wall():
 def test_rule_long_watch_sees_who_comes_later():
     # Outlines are 2.5 m apart, nearing at 1 m/s: after the paper's horizon of 2 s.
     coming = sensed(movers=[((9.0, 6.0), (-1.0, 0.0), 0.25)])
-    plain, watching = (choose(rules, state(6, 6, 0), coming).candidates for rules in (Rules(), Rules().only("long_watch")))
+    both = Rules(), Rules().only("long_watch")
+    plain, watching = (choose(rules, state(6, 6, 0), coming).candidates for rules in both)
     assert plain.clearance[0, 10] == pytest.approx(0.5, abs=1e-5)
     config = preset(Rules().only("long_watch"))
     watched = 0.1 * (config.options.dwa.horizon_steps + config.options.dwa.watch_beyond)
@@ -168,7 +170,7 @@ def test_rule_long_watch_sees_who_comes_later():
     assert not watching.admissible[0, 10]
     # Statics count to the horizon: 2 m ahead at most.
     wall = sensed(squares=[((9.25 + 1.0, 6.0), 1.0)])
-    fast = [choose(rules, state(6, 6, 0, 1.0), wall).candidates for rules in (Rules(), Rules().only("long_watch"))]
+    fast = [choose(rules, state(6, 6, 0, 1.0), wall).candidates for rules in both]
     np.testing.assert_allclose(fast[0].clearance, fast[1].clearance, atol=1e-5)
 
 
@@ -181,7 +183,7 @@ def test_rule_mover_terms_parts_movers_from_statics():
     assert not found.admissible[0, 10]
     plain = choose(Rules(), state(6, 6, 0), coming).candidates
     assert plain.terms.contact_time is plain.terms.mover_clearance is None
-    assert plain.clearance[0, 10] == pytest.approx(-0.5, abs=1e-5)  # centre on centre after 1.75 s, at 1.7 and 1.8 s
+    assert plain.clearance[0, 10] == pytest.approx(0.05 - 0.5, abs=1e-5)  # after 1.7 and 1.8 s
 
 
 def test_rule_mover_margin_keeps_away_from_movers():
@@ -201,7 +203,8 @@ def ahead(*points):
 
 def test_rule_progress_rewards_the_way_along_the_route():
     # The target lies to the left, the route goes straight on.
-    found = choose(Rules().only("progress"), state(6, 6, 0, 0.5), target=(6.0, 9.0), ahead=ahead((5.0, 6.0), (11.0, 6.0)))
+    route = ahead((5.0, 6.0), (11.0, 6.0))
+    found = choose(Rules().only("progress"), state(6, 6, 0, 0.5), target=(6.0, 9.0), ahead=route)
     terms = found.candidates.terms
     assert terms.velocity is terms.global_heading is None
     farthest = 1.0 * 2.0  # at full speed over the horizon
@@ -234,14 +237,15 @@ def test_rule_least_bad_takes_what_postpones_the_contact():
     assert (float(least.v), float(least.yaw_rate)) == (least.candidates.v[best[0]], least.candidates.yaw_rate[best[1]])
 
 
-@pytest.mark.parametrize("name", RULE_NAMES)
+@pytest.mark.parametrize("name", ["ramp", "stopping", "mover_terms", "progress", "carrot", "fixed_scale"])
 def test_decisions_without_one_rule_are_finite_and_within_the_limits(name):
     rules = EVERY_RULE.without(name)
     constants, _ = preset(rules)
     robot, dt = constants.robot, constants.behaviour.dt
     for seed in (1, 5, 7):
         _, start, known, seen, local, goal = random_scene(seed)
-        found = choose(rules, state(*start), sensed(known, seen), local, goal, scene_field(seed), ahead(start[:2], goal))
+        route = ahead(start[:2], goal)
+        found = choose(rules, state(*start), sensed(known, seen), local, goal, scene_field(seed), route)
         assert all(np.isfinite(leaf).all() for leaf in jax.tree.leaves(found))
         assert abs(float(found.v) - start[3]) <= robot.acceleration * dt + 1e-5
         assert abs(float(found.yaw_rate) - start[4]) <= robot.yaw_acceleration * dt + 1e-5
@@ -265,9 +269,17 @@ def planner(constants, options):
     )  # fmt: skip
 
 
+def scene_with_squares(seed):
+    """A random scene; in every sixth, squares hold the robot fast."""
+    occupied, start, known, seen, local, goal = random_scene(seed)
+    if seed % 6 == 5:
+        known = [((start[0] + 0.3, start[1] - 0.1), 0.1), ((start[0] - 0.28, start[1] + 0.2), 0.1)]
+    return occupied, start, known, seen, local, goal
+
+
 def expected_candidates(seed, profiles, route, constants, options):
     """[V][N] candidates by the oracle."""
-    _, start, known, seen, local, _ = random_scene(seed)
+    _, start, known, seen, local, _ = scene_with_squares(seed)
     behaviour = constants.behaviour
     around = Surroundings(lambda x, y: looked_up(scene_lattice(seed), x, y), tuple(known), tuple(seen),
                           behaviour.mover_margin, behaviour.mover_growth)
@@ -281,7 +293,7 @@ def test_extended_decisions_equal_the_oracle():
     constants, options = extended().constants, SMALL
     chosen, desperate = 0, 0
     for seed in range(18):
-        _, start, known, seen, local, goal = random_scene(seed)
+        _, start, known, seen, local, goal = scene_with_squares(seed)
         route = [(float(start[0]) - 0.3, float(start[1]) + 0.2), local, goal]
         profiles = jax.device_get(profiles_of(state(*start), constants, options=options))
         expected = expected_candidates(seed, profiles, route, constants, options)
@@ -317,7 +329,7 @@ def test_extended_decisions_equal_the_oracle():
         assert float(found.v) == profiles.v[index // width]
         assert float(found.yaw_rate) == profiles.yaw_rate[index % width]
     assert chosen > 8
-    assert desperate > 0
+    assert desperate > 1
 
 
 def test_changing_any_constant_of_the_extended_planner_does_not_retrace():
@@ -326,11 +338,8 @@ def test_changing_any_constant_of_the_extended_planner_does_not_retrace():
     decided(start, guidance, EMPTY, sensed(), constants, options=SMALL)
     before = len(traces)
     leaves, tree = jax.tree.flatten(constants)
-    for k in range(0, len(leaves), 3):
-        changed = [leaf * 1.1 + 0.01 if k <= n < k + 3 else leaf for n, leaf in enumerate(leaves)]
-        if constants.robot.disc_offsets[0] in leaves:
-            changed = [leaf if leaf is constants.robot.disc_offsets[0] else new
-                       for leaf, new in zip(leaves, changed, strict=True)]
+    for k, leaf in enumerate(leaves):
+        changed = [*leaves[:k], leaf * 1.1, *leaves[k + 1 :]]
         decided(start, guidance, EMPTY, sensed(), jax.tree.unflatten(tree, changed), options=SMALL)
     assert len(traces) == before
 
@@ -338,16 +347,15 @@ def test_changing_any_constant_of_the_extended_planner_does_not_retrace():
 def test_gradients_of_extended_scores_are_finite():
     constants, options = extended().constants, SMALL
 
-    def total(weights, start, target, mover):
-        known = sensed([((5.0, 7.0), 0.4)], [((8.0, 8.0), (0.0, 0.0), 0.2)], capacity=1)._replace(position=mover[None])
+    def total(weights, target, known, start):
         guidance = Guidance(target, target, ahead((5.0, 6.0), (9.0, 6.0)))
         found = decide(start, guidance, scene_field(2), known, replace(constants, weights=weights), options)
         return jnp.sum(jnp.where(found.candidates.admissible, found.candidates.score, 0.0)) + found.v + found.yaw_rate
 
-    slopes = jax.jit(jax.grad(total, argnums=(0, 1, 2, 3)))
+    slopes = jax.jit(jax.grad(total, argnums=(0, 1)))
     weights = ScoreWeights(**{name: jnp.float32(value) for name, value in vars(constants.weights).items()})
     for place in ((5.4, 6.0), (5.0, 7.0), (0.0, 0.0)):  # on the route, in the square, in the map's corner
-        for v in (0.0, 0.5):
-            for target, mover in (((9.0, 6.0), place), (place, (5.8, 6.2))):
-                found = slopes(weights, state(*place, 0.3, v, 0.1), jnp.float32(target), jnp.float32(mover))
-                assert all(np.isfinite(leaf).all() for leaf in jax.tree.leaves(found))
+        for target, mover in (((9.0, 6.0), place), (place, (5.8, 6.2))):
+            known = sensed([((5.0, 7.0), 0.4)], [(mover, (0.1, 0.0), 0.2)])
+            found = slopes(weights, jnp.float32(target), known, state(*place, 0.3, 0.5, 0.1))
+            assert all(np.isfinite(leaf).all() for leaf in jax.tree.leaves(found))
