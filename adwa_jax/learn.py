@@ -4,6 +4,7 @@ Rare and expensive, hence apart from the control step: `notices` tells cheaply w
 Dimension letters: H, W map; s subdivision of a cell; P route points; S unknown squares.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -11,7 +12,7 @@ import jax
 import jax.numpy as jnp
 from jax import lax
 
-from adwa_jax.astar import Status, search
+from adwa_jax.astar import SearchResult, Status, search
 from adwa_jax.constants import Constants, Options
 from adwa_jax.grid import DistanceField, Grid, Scalar, cell_of, centre_of, inflate
 from adwa_jax.heuristic_weight import weight_field
@@ -137,13 +138,12 @@ def _with_new_route(memory: Memory, position: jax.Array, grid: Grid, scenario: S
     start, goal = cell_of(grid, position), cell_of(grid, scenario.goal)
     weight = weight_field(grid, _on_map(start, grid), _on_map(goal, grid), constants.weight_rule, options.plan.scope)
 
-    def path_with(margin: jax.Array | float):
+    def path_with(margin: jax.Array) -> SearchResult:
         blocked = inflate(grid, radius + margin)
         return search(blocked, _nearest_free(blocked, start), _nearest_free(blocked, goal), weight,
                       options.plan.search)
 
-    found = path_with(behaviour.route_margin)
-    found = lax.cond(found.status == Status.FOUND, lambda: found, lambda: path_with(0.0))
+    found = _first_found(path_with, jnp.stack([jnp.float32(behaviour.route_margin), jnp.float32(0.0)]))
     margin = behaviour.clearance_margin / grid.resolution
     kept = key_points(grid.occupied, found.path, found.path_cells, margin, options.plan.keypoint_rule)
     last = jnp.arange(kept.cells.shape[0]) >= kept.count - 1
@@ -153,6 +153,21 @@ def _with_new_route(memory: Memory, position: jax.Array, grid: Grid, scenario: S
                          _from_here(points, kept.count, position, grid, margin), memory.route)  # fmt: skip
     return memory._replace(route=route, target=jnp.where(is_found, 1, memory.target),
                            replans=memory.replans + is_found.astype(jnp.int32))
+
+
+def _first_found(path_with: Callable[[jax.Array], SearchResult], margins: jax.Array) -> SearchResult:
+    """The search with the first of the margins [A] that finds a path, else with the last; one compiled search."""
+
+    def cond_fun(carry: tuple[jax.Array, SearchResult]) -> jax.Array:
+        tried, found = carry
+        return (tried == 0) | ((found.status != Status.FOUND) & (tried < margins.shape[0]))
+
+    def body_fun(carry: tuple[jax.Array, SearchResult]) -> tuple[jax.Array, SearchResult]:
+        return carry[0] + 1, path_with(margins[carry[0]])
+
+    shapes = jax.eval_shape(path_with, margins[0])
+    nothing = jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), shapes)
+    return lax.while_loop(cond_fun, body_fun, (jnp.int32(0), nothing))[1]
 
 
 def _from_here(points: jax.Array, count: jax.Array, position: jax.Array, grid: Grid, margin: jax.Array) -> Route:

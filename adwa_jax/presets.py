@@ -64,14 +64,15 @@ def paper() -> Preset:
 def preset(rules: Rules) -> Preset:
     """The paper's planner with some rules beyond it; a rule that is off leaves the paper's constants in force.
 
-    Constants of rules that are on were found on scenarios of other seeds than any figure we report.
+    Weights, margins and lookahead of the rules were found by a random search on 480 scenarios of `paper-25` and of its
+    kind with discs, of seeds that no reported figure uses; the counts of candidates and steps were chosen by hand.
     """
     base = paper()
     constants, options = base.constants, base.options
     weights, behaviour, robot, dwa = constants.weights, constants.behaviour, constants.robot, options.dwa
-    if rules.ramp:
+    if rules.ramp:  # 1.6 s in steps of 0.2 s; a mind is changed after 0.4 s
         dwa = replace(dwa, v_samples=6, yaw_rate_samples=9, horizon_steps=8, stride=2, turn_step=2)
-    if rules.long_watch:
+    if rules.long_watch:  # 3.2 s in all, 3 s without ramps
         dwa = replace(dwa, watch_beyond=8 if rules.ramp else 10)
     if rules.fixed_scale:
         dwa = replace(dwa, normalisation="none")
@@ -87,9 +88,9 @@ def preset(rules: Rules) -> Preset:
         behaviour = replace(behaviour, mover_cap=1.2)
     if rules.mover_margin:
         behaviour = replace(behaviour, mover_margin=0.1, mover_growth=0.01)
-    if rules.carrot:
+    if rules.carrot:  # far: the place that is in sight decides
         behaviour = replace(behaviour, lookahead=6.0)
-    if rules.replan:
+    if rules.replan:  # 5 cm beyond the radius for the cells, 10 cm for shortcuts
         behaviour = replace(behaviour, clearance_margin=0.35, route_margin=0.05)
     plan = replace(options.plan, subdivision=10) if rules.fine_field else options.plan
     return Preset(
@@ -119,7 +120,10 @@ def on_robot(config: Preset, robot: RobotLimits) -> Preset:
 
 
 def jackal(v_max: float = 2.0) -> RobotLimits:
-    """Clearpath's Jackal, the robot of the BARN benchmark: 0.42 × 0.33 m, covered by two discs of radius 0.196 m."""
+    """Clearpath's Jackal, the robot of the BARN benchmark: 0.42 × 0.33 m, covered by two discs of radius 0.196 m.
+
+    Its accelerations are ours, well below the 20 m/s² and 25 rad/s² that its driver allows.
+    """
     radius, offsets = covering_discs(length=0.42, width=0.33, count=2)
     return RobotLimits(
         radius=radius, disc_offsets=offsets, v_min=-0.3, v_max=v_max, yaw_rate_max=1.57,

@@ -35,14 +35,16 @@ class Rules:
     # The local target is a point of the route some way ahead, the farthest that is in sight (pure pursuit: Coulter
     # 1992). Off: the next key point.
     carrot: bool = False
-    # Progress along the route is a term, in the place of heading and speed. Off: eq. 9's terms.
+    # Progress along the route, and nearness to it, are terms in the place of speed and of the heading to the goal. Off:
+    # eq. 9's terms.
     progress: bool = False
     # Terms are divided by fixed scales. Off: by their sums over the candidates, so that a weight means something else
     # at every step.
     fixed_scale: bool = False
     # Without an admissible candidate the one with the latest contact is taken. Off: brake and turn.
     least_bad: bool = False
-    # A route that is blocked by what was sensed, or lost from sight, is planned anew. Off: one plan for all.
+    # The route is planned anew where it is blocked by what was sensed, lost from sight, or leads nowhere. Off: one plan
+    # for all.
     replan: bool = False
     # The distance field's lattice is 0.1 m or finer. Off: a quarter of a cell.
     fine_field: bool = False

@@ -188,6 +188,7 @@ def evaluate_command(
 
 @app.command("ablate")
 def ablate_command(
+    name: Annotated[str | None, typer.Argument(metavar="[SUITE]", help="The suite, as by --suite.")] = None,
     suite: SuiteOption = None,
     suite_file: SuiteFileOption = None,
     map: MapOption = None,
@@ -211,7 +212,9 @@ def ablate_command(
 
     check_folder("--out", out)
     rules, vehicle = _rules(rule), Vehicle(robot, v_max, sensor_range)
-    source = Source(suite, suite_file, map, count, seed, unknown.value, resolution, unknown_obstacles, movers,
+    if name and suite:
+        raise InputError(f"--suite: {suite}; the suite {name} is given already; name one of them")
+    source = Source(name or suite, suite_file, map, count, seed, unknown.value, resolution, unknown_obstacles, movers,
                     sensed_only)  # fmt: skip
     chosen = _work(source, configured("paper", vehicle), quiet).suite
     rows = []

@@ -6,7 +6,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from tests.reference import astar, density, distance, dwa, keypoints, metrics
+from tests.reference import astar, density, distance, dwa, keypoints, metrics, prediction, route
 
 
 def drawn(*rows):
@@ -276,3 +276,55 @@ class TestMetrics:
         half = Fraction(1, 2)
         assert metrics.polyline_danger_points(drawn("....", ".#..", "....", "...."), [(half, half), end]) == 0
         assert metrics.polyline_danger_points(occupied, [(1.5, 1.5), (2.5, 1.5), (1.5, 1.5)]) == 0
+
+
+class TestPrediction:
+    disc = prediction.Outline(0.5)
+    wall = prediction.Surroundings(lambda x, y: 4.0 - x)  # everything beyond x = 4
+
+    def test_braking_takes_one_step_at_the_command(self):
+        speeds, yaw_rates = prediction.braking(1.0, -0.5, 0.4, 0.2, 4)
+        assert speeds == pytest.approx([1.0, 0.6, 0.2, 0.0])
+        assert yaw_rates == pytest.approx([-0.5, -0.3, -0.1, 0.0])
+
+    def test_candidate_drives_on_or_stays_where_it_would_be_too_near(self):
+        through = prediction.outlook((0, 0, 0), [1.0] * 4, [0.0] * 4, 4, 1.0, 1, self.disc, self.wall)
+        assert through.end == pytest.approx((4.0, 0.0, 0.0))
+        assert through.middle == pytest.approx((2.0, 0.0))
+        assert through.static == pytest.approx(-0.5)
+        stays = prediction.outlook((0, 0, 0), [1.0] * 4, [0.0] * 4, 4, 1.0, 1, self.disc, self.wall, room=0.6)
+        assert stays.end == pytest.approx((2.0, 0.0, 0.0))
+        assert stays.static == pytest.approx(0.5)  # of the point it did not go to
+        assert stays.closest_call == pytest.approx(0.1)
+
+    def test_step_of_two_goes_along_the_mean_heading(self):
+        # A right angle between the two control steps: 2 m along 45°.
+        ahead = prediction.outlook((0, 0, 0), [1.0], [math.pi / 2], 1, 1.0, 2, self.disc, self.wall)
+        assert ahead.end == pytest.approx((math.sqrt(2), math.sqrt(2), math.pi))
+        assert ahead.headings == pytest.approx((math.pi,))
+
+    def test_mover_is_met_with_its_margin_at_the_heading_of_then(self):
+        around = prediction.Surroundings(lambda x, y: 9.0, movers=(((5.0, 0.0), (-1.0, 0.0), 0.5),), margin=0.1,
+                                         growth=0.2)
+        rod = prediction.Outline(0.5, (-1.0, 1.0))
+        assert around.moving(rod, 0.0, 0.0, 0.0, 1.0) == pytest.approx(4 - 1 - 0.5 - 0.5 - 0.3)
+        assert around.moving(rod, 0.0, 0.0, math.pi / 2, 1.0) == pytest.approx(math.sqrt(17) - 1.3)
+        ahead = prediction.outlook((0, 0, 0), [0.0] * 4, [0.0] * 4, 2, 1.0, 1, rod, around)
+        assert ahead.contact_time == 3.0  # 5 − 3 − 1 − 1 − 0.7 is the first below 0
+        assert ahead.moving == pytest.approx(1 - 1 - 1 - 0.9)
+
+    def test_squares_count_like_the_map(self):
+        around = prediction.Surroundings(lambda x, y: 9.0, squares=(((3.0, 0.0), 1.0),))
+        assert around.static(self.disc, 0.0, 0.0, 0.0) == pytest.approx(1.5)
+
+
+class TestRoute:
+    angle = ((0.0, 0.0), (4.0, 0.0), (4.0, 3.0))
+
+    def test_feet_of_every_segment(self):
+        assert route.feet(self.angle, 5.0, 1.0) == [(math.sqrt(2), 4.0), (1.0, 5.0)]
+        assert route.feet(((1.0, 1.0), (1.0, 1.0)), 1.0, 4.0) == [(3.0, 0.0)]
+
+    def test_places(self):
+        assert [route.place(self.angle, along) for along in (-1.0, 1.0, 4.0, 6.0, 9.0)] == [
+            (0.0, 0.0), (1.0, 0.0), (4.0, 0.0), (4.0, 2.0), (4.0, 3.0)]  # fmt: skip

@@ -116,8 +116,8 @@ def test_finer_lattices_are_right_but_for_rounding():
     hidden = random_map(3, SHAPE, 0.15)
     world = scenario(random_map(4, SHAPE, 0.1), (0.5, 0.5), (11.5, 11.5), hidden=hidden)
     fine = replace(OPTIONS, plan=replace(OPTIONS.plan, subdivision=10))
-    known = planned(world.grid, world.start[:2], world.goal, CONSTANTS, options=fine.plan)
-    memory = take_in(first(world, known), (6.0, 6.0), world, constants=sensing(20.0), options=fine)
+    memory = begin(world)._replace(distance=field_of(world.grid, subdivision=10).distance)
+    memory = take_in(memory, (6.0, 6.0), world, constants=sensing(20.0), options=fine)
     union = replace(world.grid, occupied=world.grid.occupied | jnp.asarray(hidden))
     np.testing.assert_allclose(memory.distance, field_of(union, subdivision=10).distance, atol=1e-5)
 
@@ -304,6 +304,17 @@ def test_lost_robot_plans_anew_from_where_it_is():
     assert int(after.replans) == 1
     np.testing.assert_allclose(after.route.points[:2], [(3.5, 2.5), (10.5, 6.5)], rtol=1e-6)
     assert length_of(after.route) == 2
+
+
+def test_new_route_goes_by_way_of_the_robots_cell_where_straight_on_is_not_free():
+    # From the cell's centre, (2.5, 6.5), the way passes 0.5 m above the square [4, 5] × [5, 6]; from (2.9, 6.05) 0.1 m.
+    one = ROOM.copy()
+    one[5, 4] = True
+    after = take_in(begin(task(one)), (2.9, 6.05), task(one), lost=True)
+    assert length_of(after.route) == 3
+    np.testing.assert_allclose(after.route.points[:3], [(2.9, 6.05), (2.5, 6.5), (10.5, 6.5)], rtol=1e-6)
+    straight = take_in(begin(task(one)), (2.4, 6.6), task(one), lost=True)
+    np.testing.assert_allclose(straight.route.points[:2], [(2.4, 6.6), (10.5, 6.5)], rtol=1e-6)
 
 
 GAP = drawn(*["......#....."] * 6, "............", *["......#....."] * 5)

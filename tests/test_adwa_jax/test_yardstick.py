@@ -130,8 +130,7 @@ SAME_END = {
 
 def test_episodes_from_the_yardsticks_plans_end_as_its_own(yardstick):
     """The closed loop alone: its key points and its field's lattice, look-up and margin differ from ours."""
-    count = 60
-    scenes = yardstick.inputs.make_scenarios(count)
+    scenes = yardstick.inputs.make_scenarios(40)
     theirs = yardstick.run("episodes", "--impl", "scalar", *_episode_options(), **scenes)
     margin = str(LOOP.behaviour.clearance_margin)
     kept = yardstick.run("keypts", "--los", margin, maps=scenes["maps"])
