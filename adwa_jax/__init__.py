@@ -19,7 +19,8 @@ from adwa_jax.constants import Behaviour, Constants, DwaOptions, Options, PlanOp
 from adwa_jax.dwa import Candidates, Decision, Guidance, decide
 from adwa_jax.metrics import Measures, PlannedMeasures
 from adwa_jax.plan import Plan, plan
-from adwa_jax.simulate import Episode, Outcome, Trace, drive, drive_lanes, trace
+from adwa_jax.episode import Episode, Outcome
+from adwa_jax.simulate import Trace, drive, drive_lanes, trace
 from adwa_jax.presets import PRESETS, ROBOTS, Preset, extended, jackal, on_robot, paper, preset
 
 __all__ = [  # in the order of the pipeline

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from rich import box
 from rich.table import Table
 
-from adwa_jax.simulate import Outcome
+from adwa_jax.episode import Outcome
 from scenarios.drawing import BLACK, BLUE, CELL_LINES, FONT, VERMILLION, new_figure
 from scenarios.suite import Suite
 from tuning.ablate import EXTENDED, PAPER, Row

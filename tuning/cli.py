@@ -19,9 +19,9 @@ import numpy as np
 import typer
 
 from adwa_jax.astar import Status
+from adwa_jax.episode import Outcome
 from adwa_jax.presets import Preset
 from adwa_jax.rules import RULE_NAMES
-from adwa_jax.simulate import Outcome
 from scenarios.errors import InputError
 from scenarios.formats import MapFile, load_map
 from scenarios.suite import SUITE_NAMES, Suite, save_suite

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from adwa_jax.episode import Outcome
 from adwa_jax.presets import Preset
-from adwa_jax.simulate import Outcome
 from scenarios.drawing import FONT, figure_legend, new_figure
 from scenarios.suite import Suite
 from tuning.figures import disc_centres, driven_path, last_heading

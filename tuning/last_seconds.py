@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from adwa_jax.simulate import Outcome
+from adwa_jax.episode import Outcome
 from scenarios.drawing import BLACK, BLUE, FONT, OCCUPIED, draw_ends, draw_map, draw_movers
 from tuning.figures import (
     disc_centres,

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from adwa_jax.simulate import Outcome
+from adwa_jax.episode import Outcome
 from scenarios.feasibility import Feasibility
 from tuning.intervals import wilson
 

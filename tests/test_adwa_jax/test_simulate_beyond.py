@@ -9,13 +9,15 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from adwa_jax.episode import Outcome
 from adwa_jax.footprint import covering_discs
+from adwa_jax.judge import clearances
 from adwa_jax.learn import first_memory, in_range
 from adwa_jax.plan import plan
 from adwa_jax.presets import extended, paper, preset
 from adwa_jax.rollout import RobotState
 from adwa_jax.rules import Rules
-from adwa_jax.simulate import Outcome, clearances, control_step, drive, drive_lanes, start_episode, trace
+from adwa_jax.simulate import control_step, drive, drive_lanes, start_episode, trace
 from scenarios.generators.paper import PaperSpec, generate
 from scenarios.hiding import hide
 from scenarios.padding import PaddedShape, pad, stack

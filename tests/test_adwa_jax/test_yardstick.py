@@ -17,6 +17,7 @@ import pytest
 from adwa_jax.astar import SearchOptions, search
 from adwa_jax.constants import DwaOptions, Options, PlanOptions
 from adwa_jax.dwa import Decision, Guidance, decide
+from adwa_jax.episode import Outcome
 from adwa_jax.grid import BILINEAR_EXCESS, DistanceField, Grid, distance_field
 from adwa_jax.heuristic_weight import WeightRule, weight_field
 from adwa_jax.keypoints import key_points, turning_points
@@ -25,7 +26,7 @@ from adwa_jax.plan import plan
 from adwa_jax.presets import paper
 from adwa_jax.rollout import RobotState
 from adwa_jax.score import ScoreWeights
-from adwa_jax.simulate import Outcome, drive
+from adwa_jax.simulate import drive
 from adwa_jax.window import RobotLimits
 from scenarios.padding import stack
 from tests.yardstick_scenarios import scenarios_of

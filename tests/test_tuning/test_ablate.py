@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from adwa_jax.episode import Outcome
 from adwa_jax.presets import extended, paper, preset
 from adwa_jax.rules import EVERY_RULE, RULE_NAMES, Rules
 from adwa_jax.score import ScoreWeights
-from adwa_jax.simulate import Outcome
 from tests.test_tuning.worlds import mixed_suite, part_of
 from tuning import ablate as module
 from tuning.ablate import Configuration, Row, ablate, configurations

@@ -14,8 +14,8 @@ import pytest
 from PIL import Image
 from typer.testing import CliRunner
 
+from adwa_jax.episode import Outcome
 from adwa_jax.presets import paper
-from adwa_jax.simulate import Outcome
 from scenarios.errors import InputError
 from scenarios.suite import SUITE_NAMES, save_suite
 from tests.test_tuning.worlds import BANDS, mixed_suite, part_of

@@ -4,10 +4,10 @@ import jax
 import numpy as np
 import pytest
 
+from adwa_jax.episode import Outcome
 from adwa_jax.heuristic_weight import WeightRule
 from adwa_jax.presets import paper
 from adwa_jax.score import ScoreWeights
-from adwa_jax.simulate import Outcome
 from scenarios.suite import make_suite
 from tests.test_tuning.worlds import OPEN, brief, drawn, mixed_suite, part_of
 from tuning.evaluate import _episodes, batch_of, evaluate

@@ -6,9 +6,9 @@ import pytest
 from matplotlib.patches import Circle
 from PIL import Image
 
+from adwa_jax.episode import Outcome
 from adwa_jax.presets import jackal, paper
 from adwa_jax.rollout import RobotState
-from adwa_jax.simulate import Outcome
 from tests.test_tuning.worlds import mixed_suite, part_of
 from tuning import gallery
 from tuning.evaluate import evaluate

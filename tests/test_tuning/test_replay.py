@@ -3,8 +3,8 @@ import json
 import numpy as np
 import pytest
 
+from adwa_jax.episode import Outcome
 from adwa_jax.presets import paper
-from adwa_jax.simulate import Outcome
 from tests.test_tuning.worlds import brief, mixed_suite, part_of
 from tuning.evaluate import evaluate
 from tuning.replay import replay

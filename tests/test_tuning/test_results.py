@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from adwa_jax.simulate import Outcome
+from adwa_jax.episode import Outcome
 from scenarios.feasibility import Feasibility
 from tuning.console import results_table
 from tuning.intervals import wilson
