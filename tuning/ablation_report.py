@@ -13,7 +13,7 @@ from rich.table import Table
 from adwa_jax.episode import Outcome
 from scenarios.drawing import BLACK, BLUE, CELL_LINES, FONT, VERMILLION, new_figure
 from scenarios.suite import Suite
-from tuning.ablate import EXTENDED, PAPER, Row
+from tuning.ablate import EXTENDED, PAPER, REPEATS, TIMED, Row
 from tuning.evaluate import LANES, WORKERS
 from tuning.outputs import save_figure, write_whole
 
@@ -32,8 +32,9 @@ for the paper's with one rule and for `extended`.
 - failures: by outcome, in brackets the hits of a standing robot.
 - time, length ratio: mean difference over the scenarios that both reach, with its 95 % interval (Student's t). Length
   ratio: driven length over the shortest path's.
-- µs a step: wall time of the evaluation, planning included and compilation left out, over the control steps that all
-  its scenarios drove, in up to {LANES[0][1]} lanes and {WORKERS} batches at once. One run, on the machine as it was.
+- µs a step: wall time of evaluating the first {TIMED} scenarios, planning included and compilation left out, over the
+  control steps that they drove, in up to {LANES[0][1]} lanes and {WORKERS} batches at once. The fastest of {REPEATS}
+  runs.
 - A rule may need another to be of use: alone it can do nothing, or harm.
 """
 
@@ -71,7 +72,7 @@ def row_sentence(row: Row) -> str:
     """What a row says, in a line."""
     name, success, interval, difference, its_interval, *_ = _cells(row)
     against = f", {difference} [{its_interval}] points to {row.configuration.base}" if row.base is not None else ""
-    return f"{name}: {success} [{interval}]{against}, {row.seconds:.1f} s"
+    return f"{name}: {success} [{interval}]{against}"
 
 
 def ablation_figure(suite: Suite, rows: Sequence[Row]) -> "Figure":

@@ -104,7 +104,7 @@ def plan_command(
     planner: PlannerName = PlannerName.improved,
     scope: ScopeName = ScopeName.node,
     weight_rule: Annotated[str | None, typer.Option(help="a,b,c,d: α, β, γ, δ of eq. 5.")] = None,
-    robot_radius: Annotated[float, typer.Option(help="Obstacles are inflated by it [m].")] = 0.0,
+    robot_radius: Annotated[float, typer.Option(help="Obstacles are inflated by it, in metres.")] = 0.0,
     budget: Annotated[int | None, typer.Option(help="Expansions a search may take; default: as many as cells.")] = None,
     unknown: UnknownOption = UnknownPolicy.occupied,
     resolution: ResolutionOption = 1.0,

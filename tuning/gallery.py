@@ -33,7 +33,7 @@ class Cause(Enum):
     """Why scenarios fail: a name for files, a heading, a sentence."""
 
     STANDING = ("standing_robot_hit", "Standing robot hit",
-                "A mover ran into the robot while it stood, which no command at that time could have avoided.")
+                "A mover ran into the robot while it stood, which no command of the last step could have avoided.")
     TURNED = ("mover_turned_back", "Mover turned back shortly before",
               f"The mover that was hit had turned back at the border of its ground in the last {SHORTLY:g} s; a robot "
               "that predicts constant velocities is surprised by that.")
@@ -136,7 +136,8 @@ def sheet(cause: Cause, group: Group, suite: Suite, seconds: float = SECONDS, y_
     for tile in tiles[count:]:
         tile.set_axis_off()
     heading = f"{suite.name}: {cause.heading.lower()}, {count} of {len(group.indices)}"
-    figure.suptitle(f"{heading} (x and y in metres)", fontsize=FONT + 2)
+    separator = "\n" if columns == 1 else " "
+    figure.suptitle(f"{heading}{separator}(x and y in metres)", fontsize=FONT + 2)
     figure_legend(figure, tiles[:count])
     if shaded is not None:
         bar = figure.colorbar(shaded, ax=tiles, shrink=0.6, pad=0.01)

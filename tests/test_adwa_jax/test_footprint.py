@@ -17,6 +17,8 @@ from tests.reference import distance as distance_reference
 from tests.test_adwa_jax.scenes import random_scene, scene_field
 from tests.test_adwa_jax.worlds import many_examples
 
+look_up = jax.jit(clearance_at)
+
 
 @jax.jit
 def over(robot, x, y, cosine, sine):
@@ -61,7 +63,7 @@ def test_several_discs_are_each_looked_up_where_they_are():
     x, y, angle = random.uniform(0, 12, (3, 50))
     found = over(robot, *jnp.float32([x, y, np.cos(angle), np.sin(angle)]))
     centres = [jnp.float32([x + offset * np.cos(angle), y + offset * np.sin(angle)]) for offset in robot.disc_offsets]
-    each = [clearance_at(scene_field(3), *centre) for centre in centres]
+    each = [look_up(scene_field(3), *centre) for centre in centres]
     np.testing.assert_allclose(found, np.min(each, axis=0) - 0.2, atol=1e-5)
 
 

@@ -15,13 +15,22 @@ from hypothesis import strategies as st
 from adwa_jax.constants import DwaOptions, Options, PlanOptions
 from adwa_jax.grid import distance_field
 from adwa_jax.learn import first_memory, in_range, known_grid, learn, overlapped, route_blocked
-from adwa_jax.plan import plan
 from adwa_jax.presets import paper
 from adwa_jax.route import route_through
 from adwa_jax.rules import Rules
 from tests.reference import distance as distance_reference
 from tests.reference import keypoints as keypoints_reference
-from tests.test_adwa_jax.worlds import CAPACITY, SHAPE, drawn, few_examples, grid_of, random_map, scenario, squares_of
+from tests.test_adwa_jax.worlds import (
+    CAPACITY,
+    SHAPE,
+    drawn,
+    few_examples,
+    grid_of,
+    plan_by_hand,
+    random_map,
+    scenario,
+    squares_of,
+)
 
 OPTIONS = Options(plan=PlanOptions(subdivision=4), dwa=DwaOptions(5, 9, 10))
 REPLANS = replace(OPTIONS, rules=Rules(replan=True))
@@ -33,8 +42,8 @@ CONSTANTS = replace(
 NEVER_LOST = jnp.bool_(False)
 NO_SQUARE = jnp.zeros(CAPACITY, bool)
 ROOM = np.zeros(SHAPE, bool)
+PLACES = SHAPE[0] * SHAPE[1]  # capacity of a route
 
-planned = jax.jit(plan, static_argnames="options")
 learned = jax.jit(learn, static_argnames="options")
 field_of = jax.jit(distance_field, static_argnames="subdivision")
 cells_in_range, cells_overlapped = jax.jit(in_range), jax.jit(overlapped)
@@ -46,9 +55,11 @@ def task(occupied=ROOM, start=(1.5, 6.5), goal=(10.5, 6.5), hidden=ROOM, **more)
     return scenario(occupied, start, goal, hidden=hidden, **more)
 
 
-def begin(world, constants=CONSTANTS):
-    """What the robot remembers when it starts."""
-    return first(world, planned(world.grid, world.start[:2], world.goal, constants, options=OPTIONS.plan))
+def begin(world, *by_way_of):
+    """What the robot remembers when it starts on a route of its start, these points and its goal."""
+    points = jnp.float32([world.start[:2], *by_way_of, *[world.goal] * (PLACES - 1 - len(by_way_of))])
+    field = field_of(world.grid, subdivision=OPTIONS.plan.subdivision)
+    return first(world, plan_by_hand(points, jnp.int32(2 + len(by_way_of)), field))
 
 
 def sensing(sensor_range):
@@ -129,8 +140,8 @@ def test_without_hidden_cells_there_is_no_field_to_keep():
 
 def test_seeing_cells_does_not_change_what_is_headed_for():
     # Whatever was headed for when the robot last learned; without new routes nothing else may change it.
-    world = scenario(drawn(*["............"] * 5, "#########..."), (1.5, 1.5), (1.5, 4.5), hidden=FOUR)
-    memory = begin(world)
+    world = task(start=(1.5, 1.5), goal=(1.5, 4.5), hidden=FOUR)
+    memory = begin(world, (9.5, 1.5), (9.5, 4.5))
     for target in (1, 3, 2):
         memory = take_in(memory, (2.5, 2.5), world, target=target, options=OPTIONS)
         assert int(memory.target) == target
@@ -192,8 +203,6 @@ def test_known_grid_has_the_map_the_cells_seen_and_the_squares():
 
 
 # Routes.
-
-PLACES = SHAPE[0] * SHAPE[1]
 
 
 def route(*points):
@@ -263,12 +272,13 @@ ACROSS = task(squares=[(6.0, 6.5, 1.0)])
 SQUARE_SENSED = jnp.array([True, False])
 
 
-def test_first_route_is_the_plans_and_ends_at_the_goal():
-    world = task(drawn("....", ".##.", "...."), (0.6, 1.4), (3.4, 1.6))
-    memory = begin(world, replace(CONSTANTS, behaviour=replace(CONSTANTS.behaviour, clearance_margin=0.25)))
-    points = np.asarray(memory.route.points)[: int(memory.route.count)]
-    np.testing.assert_allclose(points, [(0.5, 1.5), (0.5, 0.5), (3.5, 0.5), (3.4, 1.6)], atol=1e-6)
-    assert (int(memory.target), int(memory.replans)) == (1, 0)
+def test_first_route_is_the_plans_and_ends_at_the_goal_itself():
+    world = task(goal=(3.4, 1.6))
+    turns = [(0.5, 1.5), (0.5, 0.5), (3.5, 0.5)]
+    centres = jnp.float32([*turns, *[(3.5, 1.5)] * (PLACES - 3)])
+    memory = first(world, plan_by_hand(centres, jnp.int32(4), field_of(world.grid, subdivision=4)))
+    np.testing.assert_array_equal(memory.route.points[:5], np.float32([*turns, (3.4, 1.6), (3.4, 1.6)]))
+    assert (int(memory.route.count), int(memory.target), int(memory.replans)) == (4, 1, 0)
 
 
 def test_nothing_new_on_the_route_changes_nothing():
@@ -323,8 +333,7 @@ GAP = drawn(*["......#....."] * 6, "............", *["......#....."] * 5)
 def test_without_a_way_round_the_old_route_stays():
     # A wall with one gap, and a square in it.
     world = task(GAP, (1.5, 1.5), (10.5, 6.5), squares=[(6.5, 6.5, 0.3)])
-    memory = begin(world)
-    assert length_of(memory.route) >= 3
+    memory = begin(world, (5.5, 6.5))
     after = take_in(memory, (4.0, 5.0), world, target=2, known=SQUARE_SENSED)
     assert (int(after.replans), int(after.target)) == (0, 2)
     for new, old in zip(jax.tree.leaves(after.route), jax.tree.leaves(memory.route), strict=True):

@@ -173,18 +173,3 @@ def test_nothing_predicted_is_nan_and_gradients_are_finite():
         for mover in ((8.0, 8.0), place):
             found = slopes(state(*place, 0.3, 0.5, 0.2), jnp.float32(mover))
             assert all(np.isfinite(leaf).all() for leaf in jax.tree.leaves(found))
-
-
-def test_vmap_equals_a_loop():
-    starts = [random_scene(seed)[1] for seed in range(4)]
-    known = sensed(*random_scene(8)[2:4])
-
-    def one(start):
-        return predict(start, random_profiles(0), HORIZON, 2, scene_field(8), known, ROD, WARY, True, jnp.float32(0.04))
-
-    together = jax.jit(jax.vmap(one))(jax.tree.map(lambda *leaves: jnp.stack(leaves), *(state(*s) for s in starts)))
-    for k, start in enumerate(starts):
-        alone = predicted(state(*start), random_profiles(0), HORIZON, 2, scene_field(8), known, ROD, WARY, True,
-                          jnp.float32(0.04))
-        for lane, leaf in zip(jax.tree.leaves(together), jax.tree.leaves(alone), strict=True):
-            np.testing.assert_allclose(lane[k], leaf, atol=1e-5)

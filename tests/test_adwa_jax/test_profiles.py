@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from adwa_jax.dwa import candidate_profiles
 from adwa_jax.presets import extended, paper, preset
 from adwa_jax.profiles import Targets, halting_profiles, ramped_profiles, window_profiles, yaw_rates_over_range
-from adwa_jax.rules import EVERY_RULE, RULE_NAMES, Rules
+from adwa_jax.rules import EVERY_RULE, Rules
 from tests.reference.prediction import braking
 from tests.test_adwa_jax.scenes import state
 from tests.test_adwa_jax.worlds import many_examples
@@ -130,8 +130,11 @@ def commands(rules, v, yaw_rate):
     return jax.device_get(profiles_of(state(0, 0, 0, v, yaw_rate), constants, options=options)), constants, options
 
 
-@pytest.mark.parametrize("rules", [*map(Rules().only, RULE_NAMES), EVERY_RULE, *map(EVERY_RULE.without, RULE_NAMES)],
-                         ids=[*RULE_NAMES, "every", *(f"without {name}" for name in RULE_NAMES)])
+NAMES = ("ramp", "second_phase", "reverse", "long_watch")  # the rules that make candidates
+
+
+@pytest.mark.parametrize("rules", [*map(Rules().only, NAMES), EVERY_RULE, *map(EVERY_RULE.without, NAMES)],
+                         ids=[*NAMES, "every", *(f"without {name}" for name in NAMES)])
 def test_no_candidate_of_any_mix_of_rules_asks_for_more_than_the_robot_can(rules):
     for v, yaw_rate in ((0.0, 0.0), (0.75, -1.1), (1.0, 1.5)):
         found, constants, options = commands(rules, v, yaw_rate)

@@ -15,20 +15,20 @@ import numpy as np
 import pytest
 
 from adwa_jax.astar import SearchOptions, search
-from adwa_jax.constants import DwaOptions, Options, PlanOptions
+from adwa_jax.constants import DwaOptions, Options
 from adwa_jax.dwa import Decision, Guidance, decide
 from adwa_jax.episode import Outcome
 from adwa_jax.grid import BILINEAR_EXCESS, DistanceField, Grid, distance_field
 from adwa_jax.heuristic_weight import WeightRule, weight_field
 from adwa_jax.keypoints import key_points, turning_points
 from adwa_jax.obstacles import Sensed
-from adwa_jax.plan import plan
 from adwa_jax.presets import paper
 from adwa_jax.rollout import RobotState
 from adwa_jax.score import ScoreWeights
 from adwa_jax.simulate import drive
 from adwa_jax.window import RobotLimits
 from scenarios.padding import stack
+from tests.test_adwa_jax.worlds import plan_by_hand
 from tests.yardstick_scenarios import scenarios_of
 
 PEERS = Path(__file__).resolve().parents[3] / "shared" / "peers"
@@ -157,7 +157,7 @@ LOOP = replace(
     robot=replace(paper().constants.robot, yaw_brake=1e9),  # its admissibility has no limit on turning
     behaviour=replace(paper().constants.behaviour, stuck_time=1e3),  # nor does it know STUCK
 )
-LOOP_OPTIONS = replace(paper().options, plan=PlanOptions(scope="one"))
+LOOP_OPTIONS = paper().options
 
 
 def _episode_options() -> list[str]:
@@ -179,9 +179,7 @@ def _key_points(key, world) -> np.ndarray:
 
 
 def _drive_from(world, points, count):
-    known = plan(world.grid, world.start[:2], world.goal, LOOP, LOOP_OPTIONS.plan)
-    known = known._replace(field=_yardsticks_field(world.grid.occupied), key_points=points, key_point_count=count)
-    return drive(world, known, LOOP, LOOP_OPTIONS)
+    return drive(world, plan_by_hand(points, count, _yardsticks_field(world.grid.occupied)), LOOP, LOOP_OPTIONS)
 
 
 def _plan_corner_to_corner(occupied):

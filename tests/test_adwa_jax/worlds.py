@@ -8,7 +8,10 @@ import numpy as np
 from hypothesis import settings
 from hypothesis import strategies as st
 
+from adwa_jax.astar import SearchResult, Status
 from adwa_jax.grid import Grid
+from adwa_jax.metrics import PlannedMeasures
+from adwa_jax.plan import Plan
 from adwa_jax.scenario import Movers, Scenario, UnknownSquares
 
 SHAPE = (12, 12)
@@ -113,3 +116,11 @@ def scenario(occupied, start, goal, *, squares=(), movers=(), hidden=None, headi
         squares=squares_of(squares),
         movers=movers_of(movers),
     )
+
+
+def plan_by_hand(key_points, count, field):
+    """A plan of key points [P, 2] [m], the first `count` of them, that nobody searched for."""
+    none, nothing = jnp.int32(0), jnp.float32(0.0)
+    search = SearchResult(jnp.int32(Status.FOUND), *[none] * (len(SearchResult._fields) - 1))
+    measures = PlannedMeasures(*[none] * len(PlannedMeasures._fields))
+    return Plan(search, nothing, key_points, count, nothing, measures, nothing, field)
