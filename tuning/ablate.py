@@ -37,7 +37,7 @@ class Row:
     configuration: Configuration
     results: Results
     base: Results | None
-    seconds: float  # wall time of evaluating the scenarios that are timed, compilation left out
+    seconds: float  # processor time of evaluating the scenarios that are timed, compilation left out
     control_steps: int  # driven in that time
 
     def difference(self) -> tuple[float, float, float] | None:
@@ -76,7 +76,7 @@ class Row:
                         "microseconds_a_step": self.microseconds_a_step(), "outcome": results.outcome.tolist()}
 
     def microseconds_a_step(self) -> float | None:
-        """Wall time of the evaluation over the control steps driven: what a step costs here, planning included."""
+        """Processor time of the evaluation over the control steps driven: what a step costs, planning included."""
         return 1e6 * self.seconds / self.control_steps if self.control_steps else None
 
 
@@ -116,13 +116,13 @@ def _overall(progress: Progress | None, place: int, suite: Suite, rules: Sequenc
 
 
 def _cost(suite: Suite, config: Preset) -> tuple[float, int]:
-    """Wall time [s] and control steps of the suite's first `TIMED` scenarios: the fastest of `REPEATS` evaluations."""
+    """Processor time [s] and control steps of the suite's first `TIMED` scenarios: the least of `REPEATS` runs."""
     sample = Suite(suite.name, suite.scenarios[:TIMED], suite.names[:TIMED], suite.recipe)
     times = []
     for _ in range(REPEATS):
-        begin = time.perf_counter()
+        begin = time.process_time()
         results = evaluate(sample, config)
-        times.append(time.perf_counter() - begin)
+        times.append(time.process_time() - begin)
     return min(times), int(np.sum(np.rint(results.measures["time"] / np.float32(config.constants.behaviour.dt))))
 
 

@@ -237,9 +237,8 @@ def test_rule_least_bad_takes_what_postpones_the_contact():
     assert (float(least.v), float(least.yaw_rate)) == (least.candidates.v[best[0]], least.candidates.yaw_rate[best[1]])
 
 
-@pytest.mark.parametrize("name", ["ramp", "stopping"])
-def test_decisions_without_one_rule_are_finite_and_within_the_limits(name):
-    rules = EVERY_RULE.without(name)
+def test_decisions_without_ramps_are_finite_and_within_the_limits():
+    rules = EVERY_RULE.without("ramp")  # the mix whose candidates are the strangest
     constants, _ = preset(rules)
     robot, dt = constants.robot, constants.behaviour.dt
     for seed in (1, 5, 7):

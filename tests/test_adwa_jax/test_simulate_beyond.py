@@ -11,8 +11,8 @@ import pytest
 
 from adwa_jax.episode import Outcome
 from adwa_jax.footprint import covering_discs
-from adwa_jax.judge import clearances
 from adwa_jax.grid import distance_field
+from adwa_jax.judge import clearances
 from adwa_jax.learn import first_memory, in_range
 from adwa_jax.plan import plan
 from adwa_jax.presets import extended, preset
