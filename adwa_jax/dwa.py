@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
+from jax import lax
 
 from adwa_jax.admissible import halts_clear, is_admissible
 from adwa_jax.constants import Constants, Options
@@ -74,7 +75,7 @@ class _Judged(NamedTuple):
 
     v: jax.Array  # [V]
     yaw_rate: jax.Array  # [N]
-    end: Pose  # [V, N]
+    end: Pose  # [V, N]; heading [1, N]
     clearance: jax.Array  # [V, N]
     admissible: jax.Array  # [V, N] bool
     prediction: Prediction | None  # None: the paper's arcs
@@ -98,7 +99,7 @@ def decide(state: RobotState, guidance: Guidance, field: DistanceField, sensed: 
     score = weighted_sum(normalise(terms, judged.admissible, _scales(constants, options), options.dwa.normalisation),
                          constants.weights)
     candidates = Candidates(judged.v, judged.yaw_rate, judged.clearance, judged.admissible, terms, score)
-    best = jnp.argmax(jnp.where(judged.admissible, score, -jnp.inf)).astype(jnp.int32)
+    best = _first_largest(jnp.where(judged.admissible, score, -jnp.inf))
     moves = jnp.any(judged.admissible)
     width = judged.yaw_rate.shape[0]
     otherwise = _otherwise(state, judged, guidance, constants, options)
@@ -108,6 +109,12 @@ def decide(state: RobotState, guidance: Guidance, field: DistanceField, sensed: 
         index=jnp.where(moves, best, -1),
         candidates=candidates,
     )
+
+
+def _first_largest(values: jax.Array) -> jax.Array:
+    """[] int32: the lowest index (v-major) of the largest value; two plain reductions cost less than an argmax."""
+    index = jnp.arange(values.size, dtype=jnp.int32).reshape(values.shape)
+    return jnp.min(jnp.where(values == jnp.max(values), index, values.size - 1))
 
 
 def _judged_as_printed(state: RobotState, field: DistanceField, sensed: Sensed, constants: Constants,
@@ -120,7 +127,7 @@ def _judged_as_printed(state: RobotState, field: DistanceField, sensed: Sensed, 
     end = Pose(
         x=state.x + v[:, None] * arc.reach_x[-1][None, :],
         y=state.y + v[:, None] * arc.reach_y[-1][None, :],
-        heading=jnp.broadcast_to(arc.heading[-1][None, :], clearance.shape),
+        heading=arc.heading[-1][None, :],
     )
     return _Judged(v, yaw_rate, end, clearance, is_admissible(clearance, v, yaw_rate, robot), None, -clearance)
 
@@ -187,7 +194,7 @@ def _otherwise(state: RobotState, judged: _Judged, guidance: Guidance, constants
     """The command where no candidate is admissible."""
     robot, dt = constants.robot, constants.behaviour.dt
     if options.rules.least_bad:
-        index = jnp.argmin(judged.badness)
+        index = _first_largest(-judged.badness)
         return judged.v[index // judged.yaw_rate.shape[0]], judged.yaw_rate[index % judged.yaw_rate.shape[0]]
     v, yaw_rate = velocity_window(state.v, state.yaw_rate, robot, dt, 2, 2)
     return brake_and_turn(state, v, yaw_rate, guidance.local_target, dt)
@@ -197,11 +204,15 @@ def _terms(state: RobotState, judged: _Judged, guidance: Guidance, constants: Co
     rules, behaviour, end, shape = options.rules, constants.behaviour, judged.end, judged.clearance.shape
     # Beyond the paper a candidate may be admissible and yet end in an obstacle: no clearance, rather than less.
     clearance = judged.clearance if judged.prediction is None else jnp.maximum(judged.clearance, 0.0)
-    terms = Terms(
-        local_heading=_local_heading(state, judged, guidance, rules.carrot),
-        clearance=clearance_term(clearance, behaviour.clearance_cap),
-    )
-    if rules.progress and guidance.ahead is not None:
+    on_a_route = rules.progress and guidance.ahead is not None
+    targets = [guidance.local_target] if on_a_route else [guidance.local_target, guidance.goal]
+    # Mapped: a loop writes its results down, where the compiler else works them out once for each use of them.
+    headings = lax.map(lambda target: heading_term(end.x, end.y, end.heading, target), jnp.stack(targets))
+    terms = Terms(local_heading=headings[0], clearance=clearance_term(clearance, behaviour.clearance_cap))
+    if rules.carrot and judged.prediction is not None:
+        headings_ahead = judged.prediction.headings
+        terms = terms._replace(local_heading=mean_heading_term(state, headings_ahead, guidance.local_target, shape))
+    if on_a_route and guidance.ahead is not None:
         now = foot_on(guidance.ahead, state.x, state.y)
         foot, farthest = foot_on(guidance.ahead, end.x, end.y), _farthest(constants, options)
         along = foot.along
@@ -212,7 +223,7 @@ def _terms(state: RobotState, judged: _Judged, guidance: Guidance, constants: Co
     else:
         terms = terms._replace(
             velocity=velocity_term(judged.v, shape),
-            global_heading=heading_term(end.x, end.y, end.heading, guidance.goal),
+            global_heading=headings[1],
         )
     if rules.mover_terms and judged.prediction is not None:
         terms = terms._replace(
@@ -222,13 +233,6 @@ def _terms(state: RobotState, judged: _Judged, guidance: Guidance, constants: Co
     if rules.reverse:
         terms = terms._replace(forward=forward_term(judged.v, shape))
     return terms
-
-
-def _local_heading(state: RobotState, judged: _Judged, guidance: Guidance, carrot: bool) -> jax.Array:
-    if carrot and judged.prediction is not None:
-        return mean_heading_term(state, judged.prediction.headings, guidance.local_target, judged.clearance.shape)
-    end = judged.end
-    return heading_term(end.x, end.y, end.heading, guidance.local_target)
 
 
 def _scales(constants: Constants, options: Options) -> Terms:

@@ -72,20 +72,31 @@ def clearance_at(field: DistanceField, x: jax.Array, y: jax.Array) -> jax.Array:
 def bilinear(field: DistanceField, x: jax.Array, y: jax.Array) -> jax.Array:
     """Bilinear interpolation of the field at points (x, y) [m], clamped to its hull."""
     rows, columns = field.distance.shape
-    u = jnp.clip((x - field.origin[0]) / field.spacing, 0.0, columns - 1.0)
-    v = jnp.clip((y - field.origin[1]) / field.spacing, 0.0, rows - 1.0)
+    steps = 1.0 / field.spacing
+    u = _within((x - field.origin[0]) * steps, columns - 1)
+    v = _within((y - field.origin[1]) * steps, rows - 1)
     column = jnp.minimum(u.astype(jnp.int32), columns - 2)
     row = jnp.minimum(v.astype(jnp.int32), rows - 2)
-    fraction_u, fraction_v = u - column.astype(jnp.float32), v - row.astype(jnp.float32)
+    right, above = u - column.astype(jnp.float32), v - row.astype(jnp.float32)
+    left, below = 1.0 - right, 1.0 - above
     flat = field.distance.reshape(-1)
     index = row * columns + column
 
     def value(place: jax.Array) -> jax.Array:
         return flat.at[place].get(mode="promise_in_bounds")
 
-    below = value(index) + fraction_u * (value(index + 1) - value(index))
-    above = value(index + columns) + fraction_u * (value(index + columns + 1) - value(index + columns))
-    return below + fraction_v * (above - below)
+    # Each value is used once, or the compiler gathers it apart from the rest, at three times the cost.
+    return (below * (left * value(index) + right * value(index + 1))
+            + above * (left * value(index + columns) + right * value(index + columns + 1)))  # fmt: skip
+
+
+def lesser(a: jax.Array, b: jax.Array) -> jax.Array:
+    """The lesser of two numbers, neither a NaN: one instruction, where `minimum` takes three to keep a NaN."""
+    return jnp.where(a < b, a, b)
+
+
+def _within(value: jax.Array, most: int) -> jax.Array:
+    return lesser(jnp.where(value > 0.0, value, 0.0), jnp.float32(most))
 
 
 def inflate(grid: Grid, radius: Scalar) -> jax.Array:

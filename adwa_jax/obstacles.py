@@ -1,6 +1,6 @@
 """Unknown obstacles: where the movers are, what the robot senses of them, and how far they will be (§4 D)."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 import jax
@@ -12,6 +12,7 @@ from adwa_jax.scenario import Movers, UnknownSquares
 
 NOWHERE = 1e6  # distance [m] reported to what is absent; finite, so that no arithmetic on it makes a NaN
 UNROLLED = 16  # obstacles up to this many are unrolled into one fused expression
+BLOCK = 4  # obstacles looked at side by side where only those sensed are looked at
 
 
 class MoverStates(NamedTuple):
@@ -34,6 +35,9 @@ class Sensed(NamedTuple):
     seen: jax.Array  # [M] bool, in range now
     square_rounding: jax.Array  # [S] float32 [m]
     border: jax.Array | None = None  # [2, 2] low and high corner [m] between which movers are predicted to turn back
+    # Those sensed come first (`sensed_first`), and are no more than so many, [] int32. None: any may be.
+    square_count: jax.Array | None = None
+    mover_count: jax.Array | None = None
 
 
 def movers_at(movers: Movers, time: jax.Array) -> MoverStates:
@@ -107,6 +111,34 @@ def sense(squares: UnknownSquares, known: jax.Array, movers: Movers, states: Mov
     )
 
 
+def sensed_first(sensed: Sensed) -> Sensed:
+    """The same obstacles, squares and movers each in an order in which those sensed come first. Unbatched.
+
+    What is looked at a million times need then not be all, but as many as are sensed: see `Sensed.square_count`.
+    """
+    squares = _in_front(sensed.square_known, sensed.square_centre, sensed.square_half_width, sensed.square_rounding)
+    movers = _in_front(sensed.seen, sensed.position, sensed.velocity, sensed.radius)
+    centre, half_width, rounding = squares
+    position, velocity, radius = movers
+    return Sensed(centre, half_width, _first_of(sensed.square_known), position, velocity, radius,
+                  _first_of(sensed.seen), rounding, sensed.border)
+
+
+def _first_of(sensed: jax.Array) -> jax.Array:
+    return jnp.arange(sensed.shape[0]) < jnp.sum(sensed)
+
+
+def _in_front(sensed: jax.Array, *fields: jax.Array) -> list[jax.Array]:
+    """Rows of each field that are sensed, then rows of 0."""
+    place = jnp.cumsum(sensed) - 1
+    goes_to = sensed[None, :] & (place[None, :] == jnp.arange(sensed.shape[0])[:, None])  # [to, from]
+    def moved(field: jax.Array) -> jax.Array:
+        return jnp.sum(jnp.where(goes_to, field[None, :], 0.0), axis=1)
+
+    return [moved(field) if field.ndim == 1 else jnp.stack([moved(field[:, 0]), moved(field[:, 1])], axis=1)
+            for field in fields]  # fmt: skip
+
+
 def clearance_to_squares(sensed: Sensed, x: jax.Array, y: jax.Array) -> jax.Array:
     """Least distance [m] from points to known squares, `NOWHERE` without any. x, y: any equal shapes.
 
@@ -118,7 +150,7 @@ def clearance_to_squares(sensed: Sensed, x: jax.Array, y: jax.Array) -> jax.Arra
                                     sensed.square_rounding[index])
         return jnp.where(sensed.square_known[index], apart, NOWHERE)
 
-    return _least(distance, sensed.square_known.shape[0], jnp.full_like(x, NOWHERE))
+    return _least(distance, sensed.square_known.shape[0], sensed.square_count, jnp.full_like(x, NOWHERE))
 
 
 def clearance_to_movers(sensed: Sensed, x: jax.Array, y: jax.Array, ahead: jax.Array) -> jax.Array:
@@ -127,24 +159,52 @@ def clearance_to_movers(sensed: Sensed, x: jax.Array, y: jax.Array, ahead: jax.A
     With a border, as if mirrored there. Negative inside a mover; `NOWHERE` without any. x, y: any equal shapes;
     ahead: [].
     """
-    centres = sensed.position + sensed.velocity * ahead
-    if sensed.border is not None:
-        centres = _turned_back(centres, sensed.position, sensed.radius, sensed.border)
+    centres = predicted_centres(sensed, ahead)
 
     def distance(index: jax.Array | int) -> jax.Array:
         centre = centres[index]
         apart = _norm(x - centre[0], y - centre[1]) - sensed.radius[index]
         return jnp.where(sensed.seen[index], apart, NOWHERE)
 
-    return _least(distance, sensed.seen.shape[0], jnp.full_like(x, NOWHERE))
+    return _least(distance, sensed.seen.shape[0], sensed.mover_count, jnp.full_like(x, NOWHERE))
 
 
-def _least(distance: Callable[[jax.Array | int], jax.Array], count: int, start: jax.Array) -> jax.Array:
-    if count <= UNROLLED:
-        for index in range(count):
-            start = jnp.minimum(start, distance(index))
+def predicted_centres(sensed: Sensed, ahead: jax.Array) -> jax.Array:
+    """[M, 2] where the movers are expected `ahead` [s] from now, [] (§4 D b)."""
+    centres = sensed.position + sensed.velocity * ahead
+    if sensed.border is None:
+        return centres
+    return _turned_back(centres, sensed.position, sensed.radius, sensed.border)
+
+
+def over_blocks(body: Callable[[jax.Array, jax.Array], jax.Array], size: int, count: jax.Array | None,
+                start: jax.Array) -> jax.Array:
+    """Fold `body` over the indices [BLOCK] int32 of block after block of `size` obstacles, or of the first `count`.
+
+    A last block that is not full repeats the last obstacle.
+    """
+    if size == 0:
         return start
-    return lax.fori_loop(0, count, lambda index, least: jnp.minimum(least, distance(index)), start)
+
+    def body_fun(block: jax.Array, value: jax.Array) -> jax.Array:
+        return body(jnp.minimum(block * BLOCK + jnp.arange(BLOCK, dtype=jnp.int32), size - 1), value)
+
+    blocks = -(-(size if count is None else count) // BLOCK)
+    return lax.fori_loop(0, blocks, body_fun, start)
+
+
+def _least(distance: Callable[[jax.Array | int], jax.Array], size: int, count: jax.Array | None,
+           start: jax.Array) -> jax.Array:
+    if count is None and size <= UNROLLED:
+        return _least_of(distance, range(size), start)
+    return over_blocks(lambda indices, least: _least_of(distance, indices, least), size, count, start)
+
+
+def _least_of(distance: Callable[[jax.Array | int], jax.Array], indices: Iterable[jax.Array | int],
+              least: jax.Array) -> jax.Array:
+    for index in indices:
+        least = jnp.minimum(least, distance(index))
+    return least
 
 
 def _distance_to_square(x: jax.Array, y: jax.Array, centre: jax.Array, half_width: jax.Array,

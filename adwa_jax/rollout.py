@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
+from jax import lax
 
 from adwa_jax.grid import Scalar
 
@@ -51,15 +52,22 @@ def wrap(angle: jax.Array) -> jax.Array:
 def arcs(heading: jax.Array, yaw_rate: jax.Array, dt: Scalar, steps: int) -> Arcs:
     """The K = `steps` points after each Euler step (eq. 7) for N yaw rates, per unit of speed.
 
-    Σ v·cosθ·dt = v · Σ cosθ·dt: all speeds share the sums. Unbatched. heading [rad], dt [s]: []; yaw_rate: [N] [rad/s].
+    Σ v·cosθ·dt = v · Σ cosθ·dt: all speeds share the sums. Headings are turned step by step, which takes one sine and
+    cosine a yaw rate. Unbatched. heading [rad], dt [s]: []; yaw_rate: [N] [rad/s].
     """
-    count = jnp.arange(steps + 1, dtype=jnp.float32)[:, None]
-    headings = heading + count * yaw_rate[None, :] * dt
-    return Arcs(
-        reach_x=jnp.cumsum(jnp.cos(headings[:-1]) * dt, axis=0),
-        reach_y=jnp.cumsum(jnp.sin(headings[:-1]) * dt, axis=0),
-        heading=headings[1:],
-    )
+    turn_cosine, turn_sine = jnp.cos(yaw_rate * dt), jnp.sin(yaw_rate * dt)
+
+    def body_fun(carry: tuple, _: None) -> tuple[tuple, tuple]:
+        x, y, cosine, sine = carry
+        x, y = x + cosine * dt, y + sine * dt
+        turned = cosine * turn_cosine - sine * turn_sine, sine * turn_cosine + cosine * turn_sine
+        return (x, y, *turned), (x, y)
+
+    nothing = jnp.zeros_like(yaw_rate)
+    begin = nothing, nothing, jnp.cos(heading) + nothing, jnp.sin(heading) + nothing
+    _, (reach_x, reach_y) = lax.scan(body_fun, begin, None, length=steps)
+    count = jnp.arange(1, steps + 1, dtype=jnp.float32)[:, None]
+    return Arcs(reach_x, reach_y, heading + count * yaw_rate[None, :] * dt)
 
 
 def rollout(pose: Pose, v: jax.Array, yaw_rate: jax.Array, dt: Scalar, steps: int) -> Pose:

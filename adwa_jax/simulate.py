@@ -16,7 +16,7 @@ from adwa_jax.guide import guide, is_lost, local_target, notices
 from adwa_jax.judge import finish_episode, judge
 from adwa_jax.learn import Memory, field_of, first_memory, learn, learns
 from adwa_jax.metrics import start_measures
-from adwa_jax.obstacles import MoverStates, movers_at
+from adwa_jax.obstacles import MoverStates, Sensed, movers_at, sensed_first
 from adwa_jax.plan import Plan
 from adwa_jax.rollout import Pose, RobotState, euler_step, wrap
 from adwa_jax.route import Route
@@ -107,16 +107,26 @@ def lanes_step(state: EpisodeState, memory: Memory, scenarios: Scenario, plans: 
         due, state, memory, scenario = lane
         return lax.cond(due, lambda: take_in(state, memory, scenario, constants, options), lambda: (state, memory))
 
-    def step_one(state: EpisodeState, memory: Memory, scenario: Scenario, plan: Plan) -> EpisodeState:
-        moved = control_step(state, memory, scenario, plan, constants, options)[0]
-        return jax.tree.map(lambda new, old: jnp.where(state.outcome == RUNNING, new, old), moved, state)
-
     if learns(scenarios, options):
         due = state.noticed & running
         state, memory = lax.cond(
             jnp.any(due), lambda: lax.map(take_in_one, (due, state, memory, scenarios)), lambda: (state, memory)
         )
+    most = _most_sensed(jax.vmap(partial(sensed_now, constants=constants, options=options))(state, scenarios))
+
+    def step_one(state: EpisodeState, memory: Memory, scenario: Scenario, plan: Plan) -> EpisodeState:
+        moved = control_step(state, memory, scenario, plan, constants, options, most)[0]
+        return jax.tree.map(lambda new, old: jnp.where(state.outcome == RUNNING, new, old), moved, state)
+
     return jax.vmap(step_one)(state, memory, scenarios, plans), memory
+
+
+def _most_sensed(sensed: Sensed) -> tuple[jax.Array, jax.Array]:
+    """[] int32 each: the most squares and movers that any lane senses, one or many. The same for all lanes: a loop over
+    what is sensed then ends, under `vmap` too, where there is nothing more.
+    """
+    return (jnp.max(jnp.sum(sensed.square_known, axis=-1, dtype=jnp.int32)),
+            jnp.max(jnp.sum(sensed.seen, axis=-1, dtype=jnp.int32)))  # fmt: skip
 
 
 def take_in(state: EpisodeState, memory: Memory, scenario: Scenario, constants: Constants,
@@ -155,10 +165,15 @@ def start_episode(scenario: Scenario, plan: Plan) -> EpisodeState:
 
 
 def control_step(state: EpisodeState, memory: Memory, scenario: Scenario, plan: Plan, constants: Constants,
-                 options: Options) -> tuple[EpisodeState, Decision]:
-    """Sense, pick the target, decide, move robot and movers, judge (§4 B–F); also the decision with its diagnostics."""
+                 options: Options, most: tuple[jax.Array, jax.Array] | None = None) -> tuple[EpisodeState, Decision]:
+    """Sense, pick the target, decide, move robot and movers, judge (§4 B–F); also the decision with its diagnostics.
+
+    most: no fewer squares and movers, [] int32 each, than are sensed of either; None: as many as are.
+    """
     behaviour = constants.behaviour
-    sensed = sensed_now(state, scenario, constants, options)
+    as_listed = sensed_now(state, scenario, constants, options)
+    squares, movers = _most_sensed(as_listed) if most is None else most
+    sensed = sensed_first(as_listed)._replace(square_count=squares, mover_count=movers)
     field = field_of(memory, plan)
     target, guidance, in_sight = guide(state, memory, scenario, plan, field, sensed, constants, options)
     decision = decide(state.robot, guidance, field, sensed, constants, options)
@@ -170,7 +185,7 @@ def control_step(state: EpisodeState, memory: Memory, scenario: Scenario, plan: 
         step=state.step + 1,
         target=target,
         target_point=guidance.local_target,
-        known=sensed.square_known,
+        known=as_listed.square_known,
         brakings=state.brakings + (decision.index < 0).astype(jnp.int32),
         lost=jnp.where(in_sight, 0, state.lost + 1),
     )

@@ -80,7 +80,8 @@ def test_predictions_equal_the_oracle(stride, robot, behaviour, room):
             compared += 1
             stopped += room is not None and expected.static <= room
             met += expected.contact_time < WATCH * stride * DT
-            np.testing.assert_allclose([axis[i, j] for axis in found.end], expected.end, atol=2e-5)
+            end = [np.broadcast_to(axis, (4, 5))[i, j] for axis in found.end]
+            np.testing.assert_allclose(end, expected.end, atol=2e-5)
             np.testing.assert_allclose([axis[i, j] for axis in found.middle], expected.middle, atol=2e-5)
             np.testing.assert_allclose(found.headings[:, j], expected.headings, atol=1e-5)
             assert found.static[i, j] == pytest.approx(expected.static, abs=5e-5)
