@@ -72,6 +72,7 @@ def heading_term(x: jax.Array, y: jax.Array, heading: jax.Array, target: jax.Arr
     return jnp.pi - _angle(jnp.where(arrived, 1.0, ahead), jnp.where(arrived, 0.0, aside))
 
 
+@jax.custom_jvp
 def _angle(ahead: jax.Array, aside: jax.Array) -> jax.Array:
     """|arctan2(aside, ahead)| in [0, π], within 4e-7 rad: a tenth of arctan2's cost. Not both 0."""
     across, along = jnp.abs(aside), jnp.abs(ahead)
@@ -82,6 +83,14 @@ def _angle(ahead: jax.Array, aside: jax.Array) -> jax.Array:
         series = series * squared + coefficient
     acute = jnp.where(steep, 0.5 * jnp.pi - series * ratio, series * ratio)
     return jnp.where(ahead < 0, jnp.pi - acute, acute)
+
+
+@_angle.defjvp
+def _angle_jvp(primals: tuple, tangents: tuple) -> tuple[jax.Array, jax.Array]:
+    """The slope of arctan2 itself, more exact than that of the series."""
+    (ahead, aside), (ahead_dot, aside_dot) = primals, tangents
+    slope = (ahead * aside_dot - aside * ahead_dot) / (ahead * ahead + aside * aside)
+    return _angle(ahead, aside), jnp.sign(aside) * slope
 
 
 def mean_heading_term(state: RobotState, headings: jax.Array, target: jax.Array, shape: tuple[int, ...]) -> jax.Array:
