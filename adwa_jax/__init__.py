@@ -20,7 +20,8 @@ from adwa_jax.dwa import Candidates, Decision, Guidance, decide
 from adwa_jax.metrics import Measures, PlannedMeasures
 from adwa_jax.plan import Plan, plan
 from adwa_jax.episode import Episode, Outcome
-from adwa_jax.simulate import Trace, drive, drive_lanes, trace
+from adwa_jax.simulate import drive
+from adwa_jax.lanes import Trace, drive_lanes, trace
 from adwa_jax.presets import PRESETS, ROBOTS, Preset, extended, jackal, on_robot, paper, preset
 
 __all__ = [  # in the order of the pipeline
@@ -40,6 +41,7 @@ __all__ = [  # in the order of the pipeline
     "Candidates", "Decision", "Guidance", "decide",
     "Measures", "PlannedMeasures",
     "Plan", "plan",
-    "Episode", "Outcome", "Trace", "drive", "drive_lanes", "trace",
+    "Episode", "Outcome", "drive",
+    "Trace", "drive_lanes", "trace",
     "PRESETS", "ROBOTS", "Preset", "extended", "jackal", "on_robot", "paper", "preset",
 ]  # fmt: skip

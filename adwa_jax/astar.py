@@ -71,7 +71,7 @@ class SearchResult(NamedTuple):
     expanded_at: jax.Array  # [H, W] int32, order in which a cell was closed, from 0; -1: never
 
 
-class _Costs(NamedTuple):
+class Costs(NamedTuple):
     """Integer units of one straight and one diagonal step, and the largest path cost that stays exact."""
 
     straight: int
@@ -109,10 +109,10 @@ def search(blocked: jax.Array, start_cell: jax.Array, goal_cell: jax.Array, weig
     Raises ValueError where the map is too large for int32 costs to be ordered exactly.
     """
     rows, columns = blocked.shape
-    costs = _costs(rows, columns)
+    costs = unit_costs(rows, columns)
     budget = options.budget if options.budget is not None else rows * columns
-    weighted, floor = _weighted_heuristic((rows, columns), goal_cell, weight, options.heuristic, costs)
-    legal = jnp.pad(_legal_moves(blocked, options.corner_rule), 1)
+    weighted, floor = weighted_heuristic((rows, columns), goal_cell, weight, options.heuristic, costs)
+    legal = jnp.pad(legal_moves(blocked, options.corner_rule), 1)
     weighted, floor = jnp.pad(weighted, 1), jnp.pad(floor, ((1, 1), (0, 0)))
     goal = goal_cell + 1
 
@@ -123,12 +123,12 @@ def search(blocked: jax.Array, start_cell: jax.Array, goal_cell: jax.Array, weig
         carry = _expand(carry, legal, weighted, floor, costs)
         return _choose(carry, floor, goal, costs, budget, options.stop_rule)
 
-    first = _first(blocked, start_cell, goal_cell)
+    first = begin(blocked, start_cell, goal_cell)
     carry = lax.while_loop(cond_fun, body_fun, first)
     return _result(carry, start_cell, goal_cell)
 
 
-def _costs(rows: int, columns: int) -> _Costs:
+def unit_costs(rows: int, columns: int) -> Costs:
     """Finest units that hold any path of the map, or those that hold the longest paths."""
     farthest = int(MAX_WEIGHT * (rows + columns)) + 1
 
@@ -141,11 +141,11 @@ def _costs(rows: int, columns: int) -> _Costs:
     cells = capacity((straight, diagonal))
     require(cells > 4 * (rows + columns), "map size", f"{rows} x {columns}",
             "path costs must be ordered exactly in 32-bit integers", "crop the map or coarsen its resolution")
-    return _Costs(straight, diagonal, cells * straight)
+    return Costs(straight, diagonal, cells * straight)
 
 
-def _weighted_heuristic(shape: tuple[int, int], goal_cell: jax.Array, weight: jax.Array, heuristic: Heuristic,
-                        costs: _Costs) -> tuple[jax.Array, jax.Array]:
+def weighted_heuristic(shape: tuple[int, int], goal_cell: jax.Array, weight: jax.Array, heuristic: Heuristic,
+                       costs: Costs) -> tuple[jax.Array, jax.Array]:
     """ω·h in integer units of cost and ⌊h⌋ in whole cells, each [H, W] int32."""
     dr = jnp.abs(jnp.arange(shape[0], dtype=jnp.int32) - goal_cell[0])[:, None]
     dc = jnp.abs(jnp.arange(shape[1], dtype=jnp.int32) - goal_cell[1])[None, :]
@@ -172,7 +172,7 @@ def _scaled_root(square: jax.Array, scale: int) -> jax.Array:
     return whole * scale + jnp.round(fraction * scale).astype(jnp.int32)
 
 
-def _legal_moves(blocked: jax.Array, rule: CornerRule) -> jax.Array:
+def legal_moves(blocked: jax.Array, rule: CornerRule) -> jax.Array:
     """[H, W] int32, bit i set where MOVES[i] may be taken from the cell."""
     rows, columns = blocked.shape
     ringed = jnp.pad(blocked, 1, constant_values=True)
@@ -193,7 +193,7 @@ def _legal_moves(blocked: jax.Array, rule: CornerRule) -> jax.Array:
     return bits
 
 
-def _first(blocked: jax.Array, start_cell: jax.Array, goal_cell: jax.Array) -> _Carry:
+def begin(blocked: jax.Array, start_cell: jax.Array, goal_cell: jax.Array) -> _Carry:
     """Only the start reached; a start or goal that is off the map or blocked ends the search here."""
     rows, columns = blocked.shape
 
@@ -218,7 +218,7 @@ def _first(blocked: jax.Array, start_cell: jax.Array, goal_cell: jax.Array) -> _
     )
 
 
-def _expand(carry: _Carry, legal: jax.Array, weighted: jax.Array, floor: jax.Array, costs: _Costs) -> _Carry:
+def _expand(carry: _Carry, legal: jax.Array, weighted: jax.Array, floor: jax.Array, costs: Costs) -> _Carry:
     """Close the cell, offer its neighbours a route through it, and renew the three rows of the open list it touches."""
     row, column = carry.cell[0], carry.cell[1]
     corner = (row - 1, column - 1)
@@ -260,7 +260,7 @@ def _renew_rows(open_list: _Open, row: jax.Array, column: jax.Array, changed: ja
     )
 
 
-def _choose(carry: _Carry, floor: jax.Array, goal: jax.Array, costs: _Costs, budget: int,
+def _choose(carry: _Carry, floor: jax.Array, goal: jax.Array, costs: Costs, budget: int,
             stop_rule: StopRule) -> _Carry:
     """Pick the next cell to close and judge whether the search has ended."""
     f = jnp.min(carry.open.row_f)

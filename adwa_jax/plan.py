@@ -32,15 +32,31 @@ class Plan(NamedTuple):
     field: DistanceField
 
 
-def plan(grid: Grid, start: jax.Array, goal: jax.Array, constants: Constants, options: PlanOptions) -> Plan:
+class Survey(NamedTuple):
+    """Of the map and the robot's size alone, whatever the constants of eq. 5."""
+
+    optimal_length: jax.Array  # [] float32, ℓ: shortest grid path, corner rule `never`; 0 without one [m]
+    field: DistanceField
+
+
+def survey(grid: Grid, start: jax.Array, goal: jax.Array, constants: Constants, options: PlanOptions) -> Survey:
+    """What plans of one task have in common. Unbatched. start, goal: [2] (x, y) [m]."""
+    grid, start, goal = jax.tree.map(jnp.asarray, (grid, start, goal))  # suites hold numpy arrays
+    shortest = _shortest(_blocked(grid, constants, options), cell_of(grid, start), cell_of(grid, goal), options)
+    return Survey(path_length(shortest) * grid.resolution, distance_field(grid, options.subdivision))
+
+
+def plan(grid: Grid, start: jax.Array, goal: jax.Array, constants: Constants, options: PlanOptions,
+         surveyed: Survey | None = None) -> Plan:
     """Density → ω → A* → turning points → key points (§2), from point `start` to point `goal`, [2] (x, y) [m].
 
     A start or goal off the map or inside the inflated obstacles ends as BAD_START or BAD_GOAL; it is never moved.
-    Unbatched.
+    Unbatched. surveyed: the task's `survey`, made if it is not given.
     """
     grid, start, goal = jax.tree.map(jnp.asarray, (grid, start, goal))  # suites hold numpy arrays
+    surveyed = survey(grid, start, goal, constants, options) if surveyed is None else surveyed
     start_cell, goal_cell = cell_of(grid, start), cell_of(grid, goal)
-    blocked = inflate(grid, constants.robot.radius) if options.inflate else grid.occupied
+    blocked = _blocked(grid, constants, options)
     found = search(blocked, start_cell, goal_cell, _weight(grid, start_cell, goal_cell, constants, options),
                    options.search)
     margin = constants.behaviour.clearance_margin / grid.resolution
@@ -53,14 +69,18 @@ def plan(grid: Grid, start: jax.Array, goal: jax.Array, constants: Constants, op
         key_point_count=kept.count,
         key_point_length=polyline_length(points, kept.count),
         measures=planned_measures(grid, found.path, found.path_cells, kept),
-        optimal_length=path_length(_shortest(blocked, start_cell, goal_cell, options)) * grid.resolution,
-        field=distance_field(grid, options.subdivision),
+        optimal_length=surveyed.optimal_length,
+        field=surveyed.field,
     )
 
 
 def path_length(found: SearchResult) -> jax.Array:
     """[] float32: straight + √2 · diagonal steps, in cells."""
     return found.straight_steps.astype(jnp.float32) + found.diagonal_steps.astype(jnp.float32) * SQRT2
+
+
+def _blocked(grid: Grid, constants: Constants, options: PlanOptions) -> jax.Array:
+    return inflate(grid, constants.robot.radius) if options.inflate else grid.occupied
 
 
 def _weight(grid: Grid, start_cell: jax.Array, goal_cell: jax.Array, constants: Constants,

@@ -1,8 +1,5 @@
 """The integrated algorithm in closed loop (§4): sense, pick the local target, DWA, move, move the obstacles, judge."""
 
-from functools import partial
-from typing import NamedTuple
-
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -16,29 +13,15 @@ from adwa_jax.guide import guide, is_lost, local_target, notices
 from adwa_jax.judge import finish_episode, judge
 from adwa_jax.learn import Memory, field_of, first_memory, learn, learns
 from adwa_jax.metrics import start_measures
-from adwa_jax.obstacles import MoverStates, Sensed, movers_at, sensed_first
+from adwa_jax.obstacles import Sensed, sensed_first
 from adwa_jax.plan import Plan
 from adwa_jax.rollout import Pose, RobotState, euler_step, wrap
-from adwa_jax.route import Route
 from adwa_jax.scenario import Scenario
 from adwa_jax.score import turn_towards
 
 
-class Trace(NamedTuple):
-    """The driven path, for pictures; rows beyond `length` repeat the last state."""
-
-    robot: RobotState  # [T] each
-    movers: MoverStates  # [T, M, ...]
-    known: jax.Array  # [T, S] bool
-    target: jax.Array  # [T, 2] float32, the local target [m]
-    clearance: jax.Array  # [T] float32 [m]
-    length: jax.Array  # [] int32, rows in use; row k is after k + 1 steps
-    route: Route  # the last one followed
-    seen: jax.Array  # [H, W] bool, hidden cells seen at the end; [0, 0] without any
-
-
 def drive(scenario: Scenario, plan: Plan, constants: Constants, options: Options) -> Episode:
-    """One episode to its end (§4, Fig. 2). Unbatched; deterministic. `drive_lanes` drives many at once."""
+    """One episode to its end (§4, Fig. 2). Unbatched; deterministic. `lanes` drive many at once."""
     scenario, plan = jax.tree.map(jnp.asarray, (scenario, plan))  # suites hold numpy arrays
 
     def cond_fun(carry: tuple[EpisodeState, Memory]) -> jax.Array:
@@ -56,72 +39,7 @@ def drive(scenario: Scenario, plan: Plan, constants: Constants, options: Options
     return finish_episode(state, memory, scenario, plan, constants)
 
 
-def drive_lanes(scenarios: Scenario, plans: Plan, constants: Constants, options: Options) -> Episode:
-    """`drive` of B scenarios side by side, equal to it in every bit; a leading axis B on everything.
-
-    Batched by hand: under `vmap` a robot that learns, hence searches for a route, would make every lane do so in every
-    step.
-    """
-    scenarios, plans = jax.tree.map(jnp.asarray, (scenarios, plans))
-
-    def cond_fun(carry: tuple[EpisodeState, Memory]) -> jax.Array:
-        return jnp.any(carry[0].outcome == RUNNING)
-
-    def body_fun(carry: tuple[EpisodeState, Memory]) -> tuple[EpisodeState, Memory]:
-        return lanes_step(*carry, scenarios, plans, constants, options)
-
-    begin = jax.vmap(start_episode)(scenarios, plans), jax.vmap(first_memory)(scenarios, plans)
-    state, memory = lax.while_loop(cond_fun, body_fun, begin)
-    return jax.vmap(partial(finish_episode, constants=constants))(state, memory, scenarios, plans)
-
-
-def trace(scenario: Scenario, plan: Plan, constants: Constants, options: Options, steps: int) -> tuple[Episode, Trace]:
-    """The same episode, its path kept: at most `steps` control steps, which must cover the scenario's time limit.
-
-    Unbatched; driven as a lone lane of `drive_lanes`.
-    """
-    scenarios, plans = jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], (scenario, plan))
-    dt = constants.behaviour.dt
-
-    def body_fun(carry: tuple[EpisodeState, Memory], _: None) -> tuple[tuple[EpisodeState, Memory], tuple]:
-        state, memory = lanes_step(*carry, scenarios, plans, constants, options)
-        lane = jax.tree.map(lambda leaf: leaf[0], state)
-        movers = movers_at(scenario.movers, lane.step.astype(jnp.float32) * dt)
-        row = (lane.robot, movers, lane.known, lane.target_point, lane.measured.last.clearance)
-        return (state, memory), row
-
-    begin = jax.vmap(start_episode)(scenarios, plans), jax.vmap(first_memory)(scenarios, plans)
-    (state, memory), rows = lax.scan(body_fun, begin, None, length=steps)
-    episode = jax.vmap(partial(finish_episode, constants=constants))(state, memory, scenarios, plans)
-    episode, memory, length = jax.tree.map(lambda leaf: leaf[0], (episode, memory, state.step))
-    robot, movers, known, target, clearance = rows
-    return episode, Trace(robot, movers, known, target, clearance, length, memory.route, memory.seen)
-
-
-def lanes_step(state: EpisodeState, memory: Memory, scenarios: Scenario, plans: Plan, constants: Constants,
-               options: Options) -> tuple[EpisodeState, Memory]:
-    """One control step of every lane that runs; before it, those learn that noticed something."""
-    running = state.outcome == RUNNING
-
-    def take_in_one(lane: tuple) -> tuple[EpisodeState, Memory]:
-        due, state, memory, scenario = lane
-        return lax.cond(due, lambda: take_in(state, memory, scenario, constants, options), lambda: (state, memory))
-
-    if learns(scenarios, options):
-        due = state.noticed & running
-        state, memory = lax.cond(
-            jnp.any(due), lambda: lax.map(take_in_one, (due, state, memory, scenarios)), lambda: (state, memory)
-        )
-    most = _most_sensed(jax.vmap(partial(sensed_now, constants=constants, options=options))(state, scenarios))
-
-    def step_one(state: EpisodeState, memory: Memory, scenario: Scenario, plan: Plan) -> EpisodeState:
-        moved = control_step(state, memory, scenario, plan, constants, options, most)[0]
-        return jax.tree.map(lambda new, old: jnp.where(state.outcome == RUNNING, new, old), moved, state)
-
-    return jax.vmap(step_one)(state, memory, scenarios, plans), memory
-
-
-def _most_sensed(sensed: Sensed) -> tuple[jax.Array, jax.Array]:
+def most_sensed(sensed: Sensed) -> tuple[jax.Array, jax.Array]:
     """[] int32 each: the most squares and movers that any lane senses, one or many. The same for all lanes: a loop over
     what is sensed then ends, under `vmap` too, where there is nothing more.
     """
@@ -172,7 +90,7 @@ def control_step(state: EpisodeState, memory: Memory, scenario: Scenario, plan: 
     """
     behaviour = constants.behaviour
     as_listed = sensed_now(state, scenario, constants, options)
-    squares, movers = _most_sensed(as_listed) if most is None else most
+    squares, movers = most_sensed(as_listed) if most is None else most
     sensed = sensed_first(as_listed)._replace(square_count=squares, mover_count=movers)
     field = field_of(memory, plan)
     target, guidance, in_sight = guide(state, memory, scenario, plan, field, sensed, constants, options)

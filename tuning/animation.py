@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from adwa_jax.episode import Episode, Outcome
+from adwa_jax.lanes import Trace
 from adwa_jax.plan import Plan
 from adwa_jax.scenario import Scenario
-from adwa_jax.simulate import Trace
 from adwa_jax.window import RobotLimits
 from scenarios.drawing import (
     BLACK,

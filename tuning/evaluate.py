@@ -15,11 +15,11 @@ import numpy as np
 
 from adwa_jax.constants import Constants, Options
 from adwa_jax.episode import Episode
+from adwa_jax.lanes import drive_lanes
 from adwa_jax.plan import Plan, plan
 from adwa_jax.presets import Preset
 from adwa_jax.scenario import Scenario
 from adwa_jax.score import ScoreWeights
-from adwa_jax.simulate import drive_lanes
 from scenarios.errors import InputError
 from scenarios.padding import PaddedShape, pad, padded_shape, stack
 from scenarios.suite import Suite

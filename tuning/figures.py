@@ -15,10 +15,10 @@ from adwa_jax.astar import Status
 from adwa_jax.episode import Episode, Outcome
 from adwa_jax.grid import Grid, Scalar
 from adwa_jax.keypoints import KeyPoints, turning_points
+from adwa_jax.lanes import Trace
 from adwa_jax.metrics import danger_corners, danger_steps
 from adwa_jax.plan import Plan
 from adwa_jax.scenario import Scenario
-from adwa_jax.simulate import Trace
 from adwa_jax.window import RobotLimits
 from scenarios.drawing import (
     BLACK,

@@ -12,10 +12,10 @@ import numpy as np
 
 from adwa_jax.constants import Constants, Options
 from adwa_jax.episode import Episode, Outcome
+from adwa_jax.lanes import Trace, trace
 from adwa_jax.plan import Plan, plan
 from adwa_jax.presets import Preset
 from adwa_jax.scenario import Scenario
-from adwa_jax.simulate import Trace, trace
 from adwa_jax.window import RobotLimits
 from scenarios.padding import pad
 from tuning.evaluate import batch_of, planned_columns

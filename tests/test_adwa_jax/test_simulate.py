@@ -12,10 +12,11 @@ import pytest
 
 from adwa_jax.constants import Behaviour, DwaOptions, Options, PlanOptions
 from adwa_jax.episode import Outcome
+from adwa_jax.lanes import trace
 from adwa_jax.plan import plan
 from adwa_jax.presets import paper
 from adwa_jax.score import ScoreWeights
-from adwa_jax.simulate import drive, trace
+from adwa_jax.simulate import drive
 from adwa_jax.window import RobotLimits
 from tests.reference import distance as distance_reference
 from tests.reference import metrics as metrics_reference

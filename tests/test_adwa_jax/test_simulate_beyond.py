@@ -13,12 +13,13 @@ from adwa_jax.episode import Outcome
 from adwa_jax.footprint import covering_discs
 from adwa_jax.grid import distance_field
 from adwa_jax.judge import clearances
+from adwa_jax.lanes import drive_lanes, trace
 from adwa_jax.learn import first_memory, in_range
 from adwa_jax.plan import plan
 from adwa_jax.presets import extended, preset
 from adwa_jax.rollout import RobotState
 from adwa_jax.rules import Rules
-from adwa_jax.simulate import control_step, drive, drive_lanes, start_episode, trace
+from adwa_jax.simulate import control_step, drive, start_episode
 from scenarios.generators.paper import PaperSpec, generate
 from scenarios.hiding import hide
 from scenarios.padding import PaddedShape, pad, stack

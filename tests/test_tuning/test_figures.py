@@ -11,13 +11,13 @@ from PIL import Image
 
 from adwa_jax.astar import SearchResult, Status
 from adwa_jax.episode import Episode, Outcome
+from adwa_jax.lanes import Trace
 from adwa_jax.metrics import Measures, PlannedMeasures
 from adwa_jax.obstacles import MoverStates
 from adwa_jax.plan import Plan
 from adwa_jax.presets import jackal
 from adwa_jax.rollout import RobotState
 from adwa_jax.route import Route
-from adwa_jax.simulate import Trace
 from scenarios.drawing import ORANGE
 from scenarios.generators import toy
 from scenarios.generators.assembly import grid_of
