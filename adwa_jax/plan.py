@@ -4,12 +4,15 @@ Composes; every step is a kernel of its own file.
 """
 
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
+from jax import lax
 
 from adwa_jax.astar import SearchOptions, SearchResult, search
+from adwa_jax.astar_lanes import search_lanes
 from adwa_jax.constants import Constants, PlanOptions
 from adwa_jax.grid import DistanceField, Grid, cell_of, centre_of, distance_field, inflate, inside
 from adwa_jax.heuristic_weight import weight_field
@@ -42,8 +45,16 @@ class Survey(NamedTuple):
 def survey(grid: Grid, start: jax.Array, goal: jax.Array, constants: Constants, options: PlanOptions) -> Survey:
     """What plans of one task have in common. Unbatched. start, goal: [2] (x, y) [m]."""
     grid, start, goal = jax.tree.map(jnp.asarray, (grid, start, goal))  # suites hold numpy arrays
-    shortest = _shortest(_blocked(grid, constants, options), cell_of(grid, start), cell_of(grid, goal), options)
-    return Survey(path_length(shortest) * grid.resolution, distance_field(grid, options.subdivision))
+    blocked, start_cell, goal_cell, weight = _shortest(grid, start, goal, constants, options)
+    return _surveyed(grid, search(blocked, start_cell, goal_cell, weight, _exact(options)), options)
+
+
+def survey_lanes(grids: Grid, starts: jax.Array, goals: jax.Array, constants: Constants,
+                 options: PlanOptions) -> Survey:
+    """`survey` of B tasks, equal to it in every bit; a leading axis B on everything, constants included."""
+    tasks = jax.vmap(partial(_shortest, options=options))(grids, starts, goals, constants)
+    found = search_lanes(tasks.blocked, tasks.start_cell, tasks.goal_cell, tasks.weight, _exact(options))
+    return lax.map(lambda lane: _surveyed(*lane, options), (grids, found))
 
 
 def plan(grid: Grid, start: jax.Array, goal: jax.Array, constants: Constants, options: PlanOptions,
@@ -55,10 +66,21 @@ def plan(grid: Grid, start: jax.Array, goal: jax.Array, constants: Constants, op
     """
     grid, start, goal = jax.tree.map(jnp.asarray, (grid, start, goal))  # suites hold numpy arrays
     surveyed = survey(grid, start, goal, constants, options) if surveyed is None else surveyed
-    start_cell, goal_cell = cell_of(grid, start), cell_of(grid, goal)
-    blocked = _blocked(grid, constants, options)
-    found = search(blocked, start_cell, goal_cell, _weight(grid, start_cell, goal_cell, constants, options),
-                   options.search)
+    blocked, start_cell, goal_cell, weight = _weighted(grid, start, goal, constants, options)
+    found = search(blocked, start_cell, goal_cell, weight, options.search)
+    return _planned(grid, found, constants, surveyed, options)
+
+
+def plan_lanes(grids: Grid, starts: jax.Array, goals: jax.Array, constants: Constants, options: PlanOptions,
+               surveyed: Survey) -> Plan:
+    """`plan` of B tasks, equal to it in every bit; a leading axis B on everything, constants included."""
+    tasks = jax.vmap(partial(_weighted, options=options))(grids, starts, goals, constants)
+    found = search_lanes(tasks.blocked, tasks.start_cell, tasks.goal_cell, tasks.weight, options.search)
+    return lax.map(lambda lane: _planned(*lane, options), (grids, found, constants, surveyed))
+
+
+def _planned(grid: Grid, found: SearchResult, constants: Constants, surveyed: Survey, options: PlanOptions) -> Plan:
+    """From the path on."""
     margin = constants.behaviour.clearance_margin / grid.resolution
     kept = key_points(grid.occupied, found.path, found.path_cells, margin, options.keypoint_rule)
     points = centre_of(grid, kept.cells)
@@ -74,26 +96,39 @@ def plan(grid: Grid, start: jax.Array, goal: jax.Array, constants: Constants, op
     )
 
 
+def _surveyed(grid: Grid, shortest: SearchResult, options: PlanOptions) -> Survey:
+    return Survey(path_length(shortest) * grid.resolution, distance_field(grid, options.subdivision))
+
+
 def path_length(found: SearchResult) -> jax.Array:
     """[] float32: straight + √2 · diagonal steps, in cells."""
     return found.straight_steps.astype(jnp.float32) + found.diagonal_steps.astype(jnp.float32) * SQRT2
 
 
-def _blocked(grid: Grid, constants: Constants, options: PlanOptions) -> jax.Array:
-    return inflate(grid, constants.robot.radius) if options.inflate else grid.occupied
+class _Search(NamedTuple):
+    """What a search is called with."""
+
+    blocked: jax.Array  # [H, W] bool
+    start_cell: jax.Array  # [2] int32
+    goal_cell: jax.Array  # [2] int32
+    weight: jax.Array  # [H, W] float32, ω
 
 
-def _weight(grid: Grid, start_cell: jax.Array, goal_cell: jax.Array, constants: Constants,
-            options: PlanOptions) -> jax.Array:
-    """[H, W] ω; 1 where the scope is `one` (traditional A*). Cells off the map are the search's to refuse."""
+def _weighted(grid: Grid, start: jax.Array, goal: jax.Array, constants: Constants, options: PlanOptions) -> _Search:
+    """The planner's search: ω by eq. 5, 1 where the scope is `one` (traditional A*)."""
+    task = _shortest(grid, start, goal, constants, options)
     if options.scope == "one":
-        return jnp.ones(grid.occupied.shape, jnp.float32)
-    safe_start = jnp.where(inside(grid, start_cell), start_cell, 0)
-    safe_goal = jnp.where(inside(grid, goal_cell), goal_cell, 0)
-    return weight_field(grid, safe_start, safe_goal, constants.weight_rule, options.scope)
+        return task
+    safe_start, safe_goal = (jnp.where(inside(grid, cell), cell, 0) for cell in (task.start_cell, task.goal_cell))
+    return task._replace(weight=weight_field(grid, safe_start, safe_goal, constants.weight_rule, options.scope))
 
 
-def _shortest(blocked: jax.Array, start_cell: jax.Array, goal_cell: jax.Array, options: PlanOptions) -> SearchResult:
-    """The A*-optimal path that SPL compares with: ω = 1, octile, no corner cut."""
-    exact = replace(SearchOptions(), budget=options.search.budget)
-    return search(blocked, start_cell, goal_cell, jnp.ones(blocked.shape, jnp.float32), exact)
+def _shortest(grid: Grid, start: jax.Array, goal: jax.Array, constants: Constants, options: PlanOptions) -> _Search:
+    """The search for the path that SPL compares with: ω = 1. Cells off the map are the search's to refuse."""
+    blocked = inflate(grid, constants.robot.radius) if options.inflate else grid.occupied
+    return _Search(blocked, cell_of(grid, start), cell_of(grid, goal), jnp.ones(blocked.shape, jnp.float32))
+
+
+def _exact(options: PlanOptions) -> SearchOptions:
+    """Octile, no corner cut: with ω = 1 the optimum."""
+    return replace(SearchOptions(), budget=options.search.budget)

@@ -16,7 +16,7 @@ from tuning.results import Results
 
 PAPER, EXTENDED = "paper", "extended"
 COMPARED = ("time", "length_ratio")  # means over the scenarios that both reach
-TIMED, REPEATS = 32, 3  # scenarios whose evaluation is timed, and how often
+TIMED, REPEATS = 64, 3  # scenarios whose evaluation is timed, and how often
 Progress = Callable[[int, int], None]  # (scenarios driven, of how many)
 
 

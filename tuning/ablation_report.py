@@ -14,7 +14,6 @@ from adwa_jax.episode import Outcome
 from scenarios.drawing import BLACK, BLUE, CELL_LINES, FONT, VERMILLION, new_figure
 from scenarios.suite import Suite
 from tuning.ablate import EXTENDED, PAPER, REPEATS, TIMED, Row
-from tuning.evaluate import LANES
 from tuning.outputs import save_figure, write_whole
 
 if TYPE_CHECKING:
@@ -33,7 +32,7 @@ for the paper's with one rule and for `extended`.
 - time, length ratio: mean difference over the scenarios that both reach, with its 95 % interval (Student's t). Length
   ratio: driven length over the shortest path's.
 - µs a step: processor time of evaluating the first {TIMED} scenarios, planning included and compilation left out, over
-  the control steps that they drove, in batches of up to {LANES[0][1]} lanes. The least of {REPEATS} runs.
+  the control steps that they drove, which leave lanes idle towards the end. The least of {REPEATS} runs.
 - A rule may need another to be of use: alone it can do nothing, or harm.
 """
 

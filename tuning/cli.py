@@ -26,7 +26,7 @@ from scenarios.errors import InputError
 from scenarios.formats import MapFile, load_map
 from scenarios.suite import SUITE_NAMES, Suite, save_suite
 from tuning.console import note, plans_table, progress_bar, results_table, show
-from tuning.evaluate import evaluate
+from tuning.evaluate import Interrupted, evaluate
 from tuning.options import (
     MAP_HELP,
     CountOption,
@@ -169,8 +169,12 @@ def evaluate_command(
         require_one_disc("--feasible", config)
     work = _work(source, config, quiet)
     chosen = work.suite
-    with progress_bar(f"evaluating {chosen.name}", quiet) as progress, _sizes_refused(chosen.name):
-        results = evaluate(chosen, config, progress=progress)
+    try:
+        with progress_bar(f"evaluating {chosen.name}", quiet) as progress, _sizes_refused(chosen.name):
+            results = evaluate(chosen, config, progress=progress)
+    except Interrupted as stopped:
+        _report_part(stopped, json_file, out, quiet)
+        raise
     if feasible:
         results = _labelled(results, chosen, config, quiet)
     write_json(results.summary(), json_file)
@@ -184,6 +188,20 @@ def evaluate_command(
     if not results.reached.any():
         note(f"adwa: none of the {results.count} scenarios reached its goal; see their outcomes")
         raise typer.Exit(FOUND_NOTHING)
+
+
+def _report_part(stopped: Interrupted, json_file: Path | None, out: Path | None, quiet: bool) -> None:
+    """Write and show what was done before the user stopped."""
+    results = stopped.results
+    done = 0 if results is None else results.count
+    note(f"adwa: stopped; {done} of {stopped.total} scenarios are done" + ("" if results is None else ", as follows"))
+    if results is None:
+        return
+    write_json(results.summary(), json_file)
+    if out:
+        results.write(out)
+    if not quiet and json_file != STDOUT:
+        show(results_table(results))
 
 
 @app.command("ablate")

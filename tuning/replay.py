@@ -18,8 +18,9 @@ from adwa_jax.presets import Preset
 from adwa_jax.scenario import Scenario
 from adwa_jax.window import RobotLimits
 from scenarios.padding import pad
-from tuning.evaluate import batch_of, planned_columns
+from tuning.engine import driven_columns, program_of
 from tuning.outputs import names_as_they_are, parent_made, save_figure
+from tuning.plans_ahead import planned_columns
 
 LEAST_STEPS = 256  # control steps that are kept; doubled until they cover the time limit, so that few programs do
 
@@ -42,8 +43,8 @@ class Replay:
     def summary(self) -> dict[str, Any]:
         """Outcome, measures and the driven path [[x, y], ...] [m], start included."""
         episode, used = self.episode, int(self.trace.length)
-        columns = {**planned_columns(self.plan), "hit_while_stopped": episode.hit_while_stopped,
-                   "brakings": episode.brakings, "replans": episode.replans, **episode.measures._asdict()}  # fmt: skip
+        columns = {**planned_columns(self.plan), **driven_columns(episode)}
+        del columns["outcome"]  # named below
         row = {name: np.asarray(value).item() for name, value in columns.items()}
         path = np.stack([self.trace.robot.x[:used], self.trace.robot.y[:used]], axis=-1)
         path = np.concatenate([np.asarray(self.scenario.start)[None, :2], path])
@@ -60,11 +61,11 @@ class Replay:
 def replay(scenario: Scenario, config: Preset) -> Replay:
     """Plan and drive one scenario, keeping the path."""
     constants = jax.tree.map(np.float32, config.constants)
-    batch = batch_of(scenario, constants, config.options)
+    program = program_of(scenario, constants, config.options)
     last_step = int(np.round(scenario.time_limit / constants.behaviour.dt))  # in float32, as the episode counts
     steps = max(LEAST_STEPS, 1 << (last_step - 1).bit_length())
-    padded = pad(scenario, batch.shape)
-    planned, episode, path = jax.device_get(_replay(padded, constants, batch.options, steps))
+    padded = pad(scenario, program.shape)
+    planned, episode, path = jax.device_get(_replay(padded, constants, program.options, steps))
     return Replay(scenario, planned, episode, path, constants.robot)
 
 

@@ -10,7 +10,8 @@ from adwa_jax.presets import paper
 from adwa_jax.score import ScoreWeights
 from scenarios.suite import make_suite
 from tests.test_tuning.worlds import OPEN, brief, drawn, mixed_suite, part_of
-from tuning.evaluate import _episodes, batch_of, evaluate
+from tuning.engine import _block, program_of
+from tuning.evaluate import evaluate
 
 SUITE = mixed_suite()
 OTHER_WEIGHTS = ScoreWeights(local_heading=0.3, clearance=0.9, velocity=0.2, global_heading=0.4)
@@ -18,7 +19,7 @@ OTHER_WEIGHTS = ScoreWeights(local_heading=0.3, clearance=0.9, velocity=0.2, glo
 
 @pytest.fixture(scope="module")
 def together():
-    _episodes.clear_cache()  # of what other files compiled
+    _block.clear_cache()  # of what other files compiled
     return evaluate(SUITE, paper())
 
 
@@ -41,11 +42,10 @@ def test_another_order_and_repetition_give_the_same_bits(together):
         assert bits(shuffled, place) == bits(together, index), SUITE.names[index]
 
 
-def test_more_scenarios_than_a_batch_holds_give_the_same_bits(together):
-    lanes = batch_of(SUITE.scenarios[4], paper().constants, paper().options).lanes
-    many = evaluate(part_of(SUITE, [4] * lanes + [5]), paper())
-    assert all(bits(many, place) == bits(together, 4) for place in range(lanes))
-    assert bits(many, lanes) == bits(together, 5)
+def test_more_scenarios_than_all_lanes_hold_give_the_same_bits(together):
+    many = evaluate(part_of(SUITE, [4] * 70 + [5]), paper())
+    assert all(bits(many, place) == bits(together, 4) for place in range(70))
+    assert bits(many, 70) == bits(together, 5)
 
 
 def test_results_are_in_the_suites_order_and_differ(together):
@@ -100,7 +100,7 @@ def test_weights_argument_stands_in_for_the_configurations(together):
 
 
 def test_no_change_of_constants_scenarios_seeds_or_counts_compiles_anew(together):
-    compiled = _episodes._cache_size()
+    compiled = _block._cache_size()
     config = paper()
     constants = config.constants
     others = [
@@ -115,13 +115,13 @@ def test_no_change_of_constants_scenarios_seeds_or_counts_compiles_anew(together
     for scenarios in (drawn_anew.scenarios, drawn_anew.scenarios[:1]):
         short = tuple(brief(one, 1.0) for one in scenarios)
         evaluate(replace(drawn_anew, scenarios=short, names=drawn_anew.names[: len(short)]), config)
-    assert _episodes._cache_size() == compiled
+    assert _block._cache_size() == compiled
 
 
 def test_every_program_is_compiled_once(together):
     """The counter above counts: the suite's two shapes are two programs, and the rest of this file adds none."""
-    assert _episodes._cache_size() == len({batch_of(scenario, paper().constants, paper().options).shape
-                                           for scenario in SUITE.scenarios}) == 2  # fmt: skip
+    assert _block._cache_size() == len({program_of(scenario, paper().constants, paper().options).shape
+                                         for scenario in SUITE.scenarios}) == 2  # fmt: skip
 
 
 def test_a_suite_without_scenarios_is_refused():
@@ -129,17 +129,17 @@ def test_a_suite_without_scenarios_is_refused():
         evaluate(part_of(SUITE, []), paper())
 
 
-def test_a_batch_follows_from_its_scenario_alone():
-    batches = {name: batch_of(scenario, paper().constants, paper().options)
+def test_a_program_follows_from_its_scenario_alone():
+    programs = {name: program_of(scenario, paper().constants, paper().options)
                for name, scenario in zip(SUITE.names, SUITE.scenarios, strict=True)}  # fmt: skip
-    assert len(set(batches.values())) == 2
-    assert batches["large"] != batches["small"] == batches["detour"] == batches["walled"]
-    assert batches["large"].shape.rows == 24
+    assert len(set(programs.values())) == 2
+    assert programs["large"] != programs["small"] == programs["detour"] == programs["walled"]
+    assert programs["large"].shape.rows == 24
 
 
 def test_a_robot_wider_than_the_contact_window_widens_it():
     wide = replace(paper().constants, robot=replace(paper().constants.robot, radius=2.6))
-    assert batch_of(SUITE.scenarios[0], wide, paper().options).options.contact_reach >= 4
+    assert program_of(SUITE.scenarios[0], wide, paper().options).options.contact_reach >= 4
 
 
 def test_progress_rises_to_the_count():
