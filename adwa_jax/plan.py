@@ -54,7 +54,7 @@ def survey_lanes(grids: Grid, starts: jax.Array, goals: jax.Array, constants: Co
     """`survey` of B tasks, equal to it in every bit; a leading axis B on everything, constants included."""
     tasks = jax.vmap(partial(_shortest, options=options))(grids, starts, goals, constants)
     found = search_lanes(tasks.blocked, tasks.start_cell, tasks.goal_cell, tasks.weight, _exact(options))
-    return lax.map(lambda lane: _surveyed(*lane, options), (grids, found))
+    return lax.map(lambda lane: _surveyed(lane[0], lane[1], options), (grids, found))
 
 
 def plan(grid: Grid, start: jax.Array, goal: jax.Array, constants: Constants, options: PlanOptions,
@@ -76,7 +76,12 @@ def plan_lanes(grids: Grid, starts: jax.Array, goals: jax.Array, constants: Cons
     """`plan` of B tasks, equal to it in every bit; a leading axis B on everything, constants included."""
     tasks = jax.vmap(partial(_weighted, options=options))(grids, starts, goals, constants)
     found = search_lanes(tasks.blocked, tasks.start_cell, tasks.goal_cell, tasks.weight, options.search)
-    return lax.map(lambda lane: _planned(*lane, options), (grids, found, constants, surveyed))
+
+    def one(lane: tuple[Grid, SearchResult, Constants, Survey]) -> Plan:
+        grid, found, constants, surveyed = lane
+        return _planned(grid, found, constants, surveyed, options)
+
+    return lax.map(one, (grids, found, constants, surveyed))
 
 
 def _planned(grid: Grid, found: SearchResult, constants: Constants, surveyed: Survey, options: PlanOptions) -> Plan:
