@@ -14,7 +14,6 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
 
-import jax
 import numpy as np
 import typer
 
@@ -25,6 +24,7 @@ from adwa_jax.rules import RULE_NAMES
 from scenarios.errors import InputError
 from scenarios.formats import MapFile, load_map
 from scenarios.suite import SUITE_NAMES, Suite, save_suite
+from tuning.compiled import keep_compiled
 from tuning.console import note, plans_table, progress_bar, results_table, show
 from tuning.evaluate import Interrupted, evaluate
 from tuning.options import (
@@ -363,7 +363,7 @@ def demo_command(
 
 def main() -> None:
     """Entry point: a user's mistake becomes one line and exit code 2, Ctrl-C exit code 130."""
-    _use_compile_cache()
+    keep_compiled()
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # file names and ω need not be in the terminal's alphabet
             stream.reconfigure(errors="backslashreplace")
@@ -402,19 +402,6 @@ def _drop_output() -> None:
     """Let what is left in the buffer go nowhere, or the interpreter complains of it at its end."""
     if sys.stdout is sys.__stdout__:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-
-
-def _use_compile_cache() -> None:
-    """Compiled programs are kept in JAX_COMPILATION_CACHE_DIR, else in ~/.cache/adwa-jax if that can be written."""
-    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.5)
-    if os.environ.get("JAX_COMPILATION_CACHE_DIR"):
-        return
-    try:
-        folder = Path.home() / ".cache" / "adwa-jax"
-        folder.mkdir(parents=True, exist_ok=True)
-    except (OSError, RuntimeError):
-        return
-    jax.config.update("jax_compilation_cache_dir", str(folder))
 
 
 def _check_outputs(json_file: Path | None, figure: Path | None = None) -> None:

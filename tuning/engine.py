@@ -25,6 +25,7 @@ from adwa_jax.episode import RUNNING, Episode
 from adwa_jax.lanes import Lanes, Task, advanced, filled, idle_lanes, results
 from adwa_jax.scenario import Scenario
 from scenarios.padding import PaddedShape, padded_shape
+from tuning.compiled import keep_compiled
 from tuning.plans_ahead import Pair, Planner, planned_by
 
 FINEST_SPACING = 0.1  # [m]; the distance field is no finer, however many lattice steps a cell the options ask for
@@ -62,6 +63,7 @@ def judge_pairs(scenarios: Sequence[Scenario], candidates: Sequence[Constants], 
     by default as many as suit the map; workers: threads, by default one a core. `progress` is called from time to
     time. On KeyboardInterrupt the blocks in progress are ended and what is done is returned: `done` says what that is.
     """
+    keep_compiled()
     candidates = [jax.tree.map(np.float32, candidate) for candidate in candidates]
     table = _Table(len(candidates), len(scenarios), progress)
     count = usable_cores() if workers is None else workers

@@ -1,43 +1,58 @@
-"""Timing of a JAX function: the first call apart, then the median of several."""
+"""Timing of contestants one after another, round after round, so that all see the same machine."""
 
 import statistics
 import time
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict, dataclass, field
+from typing import Any
 
-import jax
-
-REPEATS = 5
+ROUNDS = 5
 
 
-class Timing(NamedTuple):
-    """How long one piece of work took."""
+@dataclass
+class Figure:
+    """What a contestant reached."""
 
-    name: str
+    task: str
+    who: str
     unit: str  # what is counted
-    items: int  # of them in one call
-    first_s: float  # compiling included
-    seconds: tuple[float, ...]  # one a call thereafter
-    detail: dict[str, float]  # what makes the work comparable
+    rates: list[float] = field(default_factory=list)  # items a second on all cores, one a round
+    first_s: float | None = None  # the first call, compiling included [s]
+    note: str = ""
 
     @property
     def rate(self) -> float:
-        """Items a second, by the median call."""
-        return self.items / statistics.median(self.seconds)
+        """The median."""
+        return statistics.median(self.rates)
+
+    def record(self, baseline: float | None) -> dict[str, Any]:
+        """The JSON form; baseline: a rate that it is compared with."""
+        return asdict(self) | {"rate": self.rate, "ratio": self.rate / baseline if baseline else None}
 
 
-def timed(name: str, unit: str, items: int, call: Callable[[], Any], repeats: int = REPEATS,
-          describe: Callable[[Any], dict[str, float]] = lambda _: {}) -> Timing:
-    """Call once to compile and warm up, then `repeats` times; a call counts once its result is there.
+def contest(task: str, unit: str, contestants: dict[str, Callable[[], float]], rounds: int = ROUNDS) -> list[Figure]:
+    """Each contestant is called once to warm up, then in turn; it returns its items a second."""
+    figures = [Figure(task, who, unit) for who in contestants]
+    for figure, call in zip(figures, contestants.values(), strict=True):
+        begin = time.perf_counter()
+        call()
+        figure.first_s = time.perf_counter() - begin
+    for _ in range(rounds):
+        for figure, call in zip(figures, contestants.values(), strict=True):
+            figure.rates.append(call())
+    return figures
 
-    describe: figures of the result that say what work was done.
-    """
-    first, result = _seconds(call)
-    seconds = tuple(_seconds(call)[0] for _ in range(repeats))
-    return Timing(name, unit, items, first, seconds, describe(result))
 
-
-def _seconds(call: Callable[[], Any]) -> tuple[float, Any]:
+def rate_of(items: int, work: Callable[[], Any]) -> float:
+    """Items a second of one call."""
     begin = time.perf_counter()
-    result = jax.block_until_ready(call())
-    return time.perf_counter() - begin, result
+    work()
+    return items / (time.perf_counter() - begin)
+
+
+def in_threads(parts: Iterable[Callable[[], Any]]) -> list[Any]:
+    """The parts at once, a thread each."""
+    parts = list(parts)
+    with ThreadPoolExecutor(len(parts)) as pool:
+        return [future.result() for future in [pool.submit(part) for part in parts]]

@@ -1,0 +1,189 @@
+"""Closed-loop episodes through the engine: against the yardstick, and how the engine scales."""
+
+import json
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import replace
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from adwa_jax.constants import Constants, Options
+from adwa_jax.episode import Outcome
+from adwa_jax.lanes import drive_lanes
+from adwa_jax.presets import extended, paper
+from adwa_jax.scenario import Scenario
+from scenarios.padding import stack
+from scenarios.suite import make_suite
+from tests.benchmarks.decisions import yardsticks_field
+from tests.benchmarks.inputs import scenarios
+from tests.benchmarks.timing import Figure, contest, rate_of
+from tests.benchmarks.yardstick import Yardstick
+from tests.test_adwa_jax.worlds import plan_by_hand
+from tests.yardstick_scenarios import scenarios_of
+from tuning.engine import Judged, judge_pairs, program_of, usable_cores
+
+BASE = paper()
+LOOP = replace(
+    BASE.constants,
+    robot=replace(BASE.constants.robot, yaw_brake=1e9),  # the yardstick's admissibility has no limit on turning
+    behaviour=replace(BASE.constants.behaviour, stuck_time=1e3),  # nor does it know STUCK
+)
+SAME_END = {Outcome.REACHED: 0, Outcome.HIT_KNOWN: 1, Outcome.HIT_UNKNOWN: 2, Outcome.HIT_MOVER: 3, Outcome.STUCK: 4,
+            Outcome.TIMEOUT: 4, Outcome.NO_PATH: 5}  # fmt: skip
+NEAR_TIE = 1e-4  # a share of a score by which two candidates may differ and yet be exchanged by rounding
+
+
+def yardstick_options() -> list[str]:
+    """Our constants in the yardstick's words."""
+    weights, robot, behaviour, dwa = LOOP.weights, LOOP.robot, LOOP.behaviour, BASE.options.dwa
+    options = {
+        "H": dwa.horizon_steps, "nv": dwa.v_samples, "nw": dwa.yaw_rate_samples, "norm": dwa.normalisation,
+        "wl": weights.local_heading, "wD": weights.clearance, "wv": weights.velocity, "wg": weights.global_heading,
+        "dcap": behaviour.clearance_cap, "los": behaviour.clearance_margin, "kptol": behaviour.keypoint_tolerance,
+        "range": behaviour.sensor_range, "dt": behaviour.dt, "rr": robot.radius, "vmax": robot.v_max,
+        "wmax": robot.yaw_rate_max, "amax": robot.acceleration, "alpha": robot.yaw_acceleration,
+    }  # fmt: skip
+    return [word for name, value in options.items() for word in (f"--{name}", str(value))]
+
+
+def against_yardstick(yardstick: Yardstick | None, count: int = 1000) -> list[Figure]:
+    """Planning and driving the yardstick's scenarios with its constants; episodes and control steps a second."""
+    arrays = scenarios(count)
+    worlds = scenarios_of(**arrays)
+    steps: dict[str, float] = {}
+
+    def ours() -> float:
+        begin = time.perf_counter()
+        judged = judge_pairs(worlds, [LOOP], BASE.options)
+        seconds = time.perf_counter() - begin
+        steps["adwa-jax"] = float(judged.columns["time"].sum()) / 0.1 / seconds
+        return count / seconds
+
+    contestants = {"adwa-jax": ours}
+    if yardstick:
+        contestants["C++ AVX-512"] = lambda: yardstick.rate("episodes", arrays, *yardstick_options())
+    figures = contest("closed loop 25 × 25, planning included", "episodes", contestants, rounds=3)
+    figures[0].note = f"{steps['adwa-jax']:,.0f} control steps a second"
+    return figures
+
+
+def agreement(yardstick: Yardstick, count: int = 1000) -> dict[str, Any]:
+    """How many episodes end as the yardstick's do, from its plans and its field: the closed loop alone."""
+    arrays = scenarios(count)
+    theirs = yardstick.items("episodes", arrays, "--impl", "scalar", *yardstick_options())
+    kept = yardstick.items("keypts", {"maps": arrays["maps"]}, "--los", str(LOOP.behaviour.clearance_margin))
+    worlds = scenarios_of(**arrays)
+    options = program_of(worlds[0], LOOP, BASE.options).options
+    ends, lengths = [], []
+    for first in range(0, count, 50):
+        part = [_by_hand(world, record["key"]) for world, record in
+                zip(worlds[first : first + 50], kept[first : first + 50], strict=True)]  # fmt: skip
+        found = _driven(stack([world for world, _, _ in part]), np.stack([points for _, points, _ in part]),
+                        np.int32([number for _, _, number in part]), LOOP, options)  # fmt: skip
+        ends += [SAME_END[Outcome(outcome)] for outcome in found.outcome.tolist()]
+        lengths += found.measures.length.tolist()
+    same = np.array([end == record["kind"] for end, record in zip(ends, theirs, strict=True)])
+    apart = np.abs(np.array(lengths) - [record["length"] for record in theirs])
+    return {"count": count, "same outcome": float(same.mean()), "same path within 2 cm": float((apart < 0.02).mean()),
+            "success, ours": float(np.mean(np.array(ends) == 0)),
+            "success, theirs": float(np.mean([record["kind"] == 0 for record in theirs]))}  # fmt: skip
+
+
+def _by_hand(world: Scenario, key: list) -> tuple[Scenario, np.ndarray, int]:
+    points = np.float32([*key[:-1], world.goal])
+    capacity = world.grid.occupied.size
+    return world, np.pad(points, ((0, capacity - len(points)), (0, 0)), mode="edge"), len(points)
+
+
+@jax.jit
+def _plans(worlds: Scenario, points: jax.Array, counts: jax.Array) -> Any:
+    return jax.lax.map(lambda one: plan_by_hand(one[1], one[2], yardsticks_field(one[0].grid.occupied)),
+                       (worlds, points, counts))  # fmt: skip
+
+
+def _driven(worlds: Scenario, points: np.ndarray, counts: np.ndarray, constants: Constants, options: Options) -> Any:
+    plans = _plans(worlds, points, counts)
+    drive = jax.jit(drive_lanes, static_argnames="options")
+    return jax.device_get(drive(worlds, plans, jax.tree.map(jnp.float32, constants), options=options))
+
+
+def presets(count: int = 512) -> list[Figure]:
+    """Episodes a second of both presets on the suite paper-25."""
+    worlds = make_suite("paper-25", seed=0, count=count).scenarios
+
+    def of(preset: Any) -> Any:
+        return lambda: rate_of(count, lambda: judge_pairs(worlds, [preset.constants], preset.options))
+
+    return contest("episodes of paper-25", "episodes", {"paper": of(paper()), "extended": of(extended())}, rounds=3)
+
+
+def scaling(lanes: tuple[int, ...] = (8, 16, 32, 64), pairs: int = 1024) -> list[Figure]:
+    """Lanes of a worker, workers, and how many pairs there are: the rate should not fall as they grow."""
+    worlds = make_suite("paper-20", seed=0, count=128).scenarios
+    weights = candidates(pairs // len(worlds))
+
+    def run(count: int = len(weights), **how: int) -> Any:
+        return lambda: rate_of(count * len(worlds), lambda: judge_pairs(worlds, weights[:count], BASE.options, **how))
+
+    by_lanes = contest("lanes of a worker", "episodes", {str(width): run(lanes=width) for width in lanes}, rounds=2)
+    by_cores = contest("workers", "episodes", {str(count): run(workers=count)
+                                               for count in range(1, usable_cores() + 1)}, rounds=2)  # fmt: skip
+    by_pairs = contest("pairs", "episodes", {str(count * len(worlds)): run(count)
+                                             for count in (1, 2, 4, len(weights))}, rounds=2)  # fmt: skip
+    return [*by_lanes, *by_cores, *by_pairs]
+
+
+def candidates(count: int) -> list[Constants]:
+    """Constants that differ in their score weights."""
+    weights = BASE.constants.weights
+    shares = np.linspace(0.6, 1.0, count)
+    return [replace(BASE.constants, weights=replace(weights, local_heading=float(share))) for share in shares]
+
+
+def job(weights: int, scenarios: int, log: float = 30.0) -> dict[str, Any]:
+    """A tuning job's evaluations on the suite paper-20: wall time, rate as it went, and peak memory of this process."""
+    worlds = make_suite("paper-20", seed=11, count=scenarios).scenarios
+    judge_pairs(worlds[:2], candidates(1), BASE.options)  # compiled before
+    begin, seen, shown = time.perf_counter(), [], [0.0]
+
+    def progress(done: int, total: int) -> None:
+        seconds = time.perf_counter() - begin
+        seen.append((done, seconds))
+        if seconds - shown[0] > log:
+            shown[0] = seconds
+            print(f"  {done:,} of {total:,} episodes in {seconds:,.0f} s: {done / seconds:.1f} a second", flush=True)
+
+    judged: Judged = judge_pairs(worlds, candidates(weights), BASE.options, progress=progress)
+    seconds = time.perf_counter() - begin
+    return {"weights": weights, "scenarios": scenarios, "episodes": int(judged.done.sum()), "wall_s": seconds,
+            "episodes_per_s": judged.done.sum() / seconds, "plans": judged.plans, "peak_MiB": peak_mebibytes(),
+            "progress": [seen[int(place)] for place in np.unique(np.geomspace(1, len(seen), 25).astype(int) - 1)]}
+
+
+def peak_mebibytes() -> float:
+    """Of this process so far."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+
+
+def compile_time() -> dict[str, float]:
+    """Seconds of the first evaluation of one scenario in a new process, without and with compiled programs kept."""
+    code = ("import time, json; from adwa_jax.presets import {preset}; from scenarios.suite import make_suite; "
+            "from tuning.evaluate import evaluate; s = make_suite('paper-25', 0, 1); b = time.perf_counter(); "
+            "evaluate(s, {preset}()); print(json.dumps(time.perf_counter() - b))")  # fmt: skip
+    found = {}
+    for preset in ("paper", "extended"):
+        with tempfile.TemporaryDirectory() as folder:
+            environment = {**os.environ, "JAX_COMPILATION_CACHE_DIR": folder,
+                           "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0.2"}  # fmt: skip
+            for state in ("cold", "kept"):
+                call = [sys.executable, "-c", code.format(preset=preset)]
+                output = subprocess.run(call, env=environment, capture_output=True, text=True, check=True).stdout
+                found[f"{preset}, {state}"] = float(json.loads(output))
+    return found
