@@ -30,7 +30,7 @@ from tuning.plans_ahead import Pair, Planner, planned_by
 
 FINEST_SPACING = 0.1  # [m]; the distance field is no finer, however many lattice steps a cell the options ask for
 # Side of the map [cells] up to which a worker has so many lanes: what they hold should stay in the cache.
-LANES = ((128, 32), (256, 16), (512, 8))
+LANES = ((128, 64), (256, 16), (512, 8))
 FEWEST_LANES = 4
 FILLED_AT_ONCE = 4  # lanes that one call fills
 LOOK = 0.2  # [s] between two looks at how far the work is
