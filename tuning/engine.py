@@ -211,8 +211,9 @@ def _work(queue: _Queue, options: Options, width: int, table: _Table) -> None:
             held |= dict(zip(places, (pair for pair, _ in taken), strict=False))
         if lanes is None or not held:
             return
-        lanes, episodes = _block(lanes, options)
-        _hand_in(jax.device_get(episodes), held, table)
+        moved: Lanes = _block(lanes, options)
+        _hand_in(moved, held, table)
+        lanes = moved
 
 
 def _with(lanes: Lanes | None, tasks: list[Task], places: list[int], width: int) -> Lanes:
@@ -223,10 +224,12 @@ def _with(lanes: Lanes | None, tasks: list[Task], places: list[int], width: int)
     return _fill(lanes, rows, np.array(places + [0] * missing, np.int32), np.int32(len(tasks)))
 
 
-def _hand_in(episodes: Episode, held: dict[int, _Held], table: _Table) -> None:
+def _hand_in(lanes: Lanes, held: dict[int, _Held], table: _Table) -> None:
     """Write down the episodes that have ended, and let go of their lanes."""
-    ended = [lane for lane in held if episodes.outcome[lane] != RUNNING]
+    outcome = np.asarray(lanes.state.outcome)
+    ended = [lane for lane in held if outcome[lane] != RUNNING]
     if ended:
+        episodes = jax.device_get(_results(lanes))
         planned = [held[lane].figures for lane in ended]
         rows = {name: np.stack([figures[name] for figures in planned]) for name in planned[0]}
         rows |= {name: values[ended] for name, values in driven_columns(episodes).items()}
@@ -255,6 +258,10 @@ def _fill(lanes: Lanes, tasks: Task, places: jax.Array, count: jax.Array) -> Lan
 
 
 @partial(jax.jit, static_argnames="options", donate_argnames="lanes")
-def _block(lanes: Lanes, options: Options) -> tuple[Lanes, Episode]:
-    lanes = advanced(lanes, options, BLOCK_STEPS)
-    return lanes, results(lanes)
+def _block(lanes: Lanes, options: Options) -> Lanes:
+    return advanced(lanes, options, BLOCK_STEPS)
+
+
+@jax.jit
+def _results(lanes: Lanes) -> Episode:
+    return results(lanes)
