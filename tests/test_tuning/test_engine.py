@@ -87,7 +87,7 @@ def test_pairs_run_in_parts_give_the_same_bits(usual):
 
 
 def test_lanes_equal_the_unbatched_kernels(usual):
-    """All that is counted exactly; a last bit of a sum may be rounded otherwise in another program."""
+    """Counts exactly; another program may round last bits otherwise, which add up over an episode."""
     program = program_of(WORLDS[0], CONFIG.constants, CONFIG.options)
 
     @jax.jit
@@ -99,7 +99,7 @@ def test_lanes_equal_the_unbatched_kernels(usual):
         constants = jax.tree.map(np.float32, CANDIDATES[row])
         alone = by_itself(pad(WORLDS[column], program.shape), constants)
         for name, value in alone.items():
-            np.testing.assert_allclose(usual.columns[name][row, column], np.asarray(value), rtol=5e-7, err_msg=name)
+            np.testing.assert_allclose(usual.columns[name][row, column], np.asarray(value), rtol=1e-5, err_msg=name)
 
 
 def test_several_host_devices_give_the_same_bits():
