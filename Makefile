@@ -12,7 +12,9 @@ demo: $(STAMP)
 test: $(STAMP)
 	$(BIN)/python -m pytest
 
+# Beside other programs, some of which are installed for it.
 bench: $(STAMP)
+	UV_PROJECT_ENVIRONMENT=.venv $(BIN)/uv sync --frozen --quiet --group bench
 	$(BIN)/python -m tests.benchmarks
 
 lint: $(STAMP)

@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 
 import jax
+import pytest
 
 from adwa_jax import Outcome, Status, drive, paper, plan
 from scenarios.suite import make_suite
@@ -13,12 +14,18 @@ ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text()
 
 
-def test_the_python_example_runs_and_prints_outcomes(capsys):
-    (example,) = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
-    assert len(example.strip().splitlines()) <= 10
+PYTHON = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+
+
+@pytest.mark.parametrize("example", PYTHON, ids=["first screen", "many weights"])
+def test_the_python_examples_run_and_print_outcomes(example, capsys):
     exec(compile(example, "README.md", "exec"), {})
     printed = capsys.readouterr().out
     assert printed.count("'REACHED': ") == 2
+
+
+def test_the_first_example_is_short():
+    assert len(PYTHON[0].strip().splitlines()) <= 10
 
 
 def test_the_weights_example_is_the_paper_presets_constants(tmp_path):
