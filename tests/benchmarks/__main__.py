@@ -7,6 +7,8 @@ import argparse
 import json
 import os
 import platform
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +32,7 @@ def main() -> None:
     OUT.mkdir(exist_ok=True)
     keep_compiled()
     if arguments.job:
-        write(OUT / f"job_{arguments.job[0]}x{arguments.job[1]}.json", episodes.job(*arguments.job))
+        write(job_file(*arguments.job), episodes.job(*arguments.job))
         return
     report = measured()
     write(OUT / "bench.json", report)
@@ -53,13 +55,24 @@ def measured() -> dict[str, Any]:
         figures += searches.against_peers(program, side, count, chunk)
     figures += episodes.against_yardstick(program)
     figures += decisions.presets_beside() + episodes.presets() + episodes.scaling()
-    checks: dict[str, Any] = {"compile and first evaluation [s]": episodes.compile_time()}
+    checks: dict[str, Any] = {"seconds to compile and evaluate one scenario": episodes.compile_time()}
     if program:
         differing = decisions.choices_that_differ(program)
         checks["DWA choices that differ of 1000, by how much ours scores better"] = differing
         checks["episodes from the yardstick's plans"] = episodes.agreement(program)
     return {"machine": machine(), "figures": records(figures), "checks": checks,
-            "jobs": [episodes.job(*sizes) for sizes in JOBS]}  # fmt: skip
+            "jobs": [job_apart(*sizes) for sizes in JOBS]}  # fmt: skip
+
+
+def job_apart(weights: int, scenarios: int) -> dict[str, Any]:
+    """A job in a process of its own, whose memory it has for itself."""
+    subprocess.run([sys.executable, "-m", "tests.benchmarks", "--job", str(weights), str(scenarios)], check=True)
+    return json.loads(job_file(weights, scenarios).read_text())
+
+
+def job_file(weights: int, scenarios: int) -> Path:
+    """Where a job's figures are written."""
+    return OUT / f"job_{weights}x{scenarios}.json"
 
 
 def records(figures: list[Figure]) -> list[dict[str, Any]]:
