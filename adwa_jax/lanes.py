@@ -1,4 +1,4 @@
-"""Many episodes side by side, a lane each: the same answers as `simulate.drive`, at the speed of the machine.
+"""Many episodes side by side, a lane each: the answers of `simulate.drive`, but for rounding, at the machine's speed.
 
 Batched by hand: under `vmap` a robot that learns, hence searches for a route, would make every lane do so in every
 step, and all would go on until the slowest ends. Here those learn that have to, and a lane whose episode has ended is
