@@ -3,7 +3,7 @@
 Each of a few threads keeps a fixed number of lanes; between short compiled blocks of control steps the lanes whose
 episodes have ended hand in their results and get the next pairs of the queue. What a pair's answer is depends on that
 pair only: the same bits come out whatever the lanes, threads, order or company. Memory is that of the lanes, of a few
-plans and of the table of results, however long the queue.
+plans, and some 170 bytes a pair for the queue and the table of results.
 
 Dimension letters: W candidates; S scenarios; B lanes.
 """

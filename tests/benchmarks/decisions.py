@@ -10,7 +10,7 @@ import numpy as np
 
 from adwa_jax.constants import Constants, DwaOptions, Options
 from adwa_jax.dwa import Decision, Guidance, decide
-from adwa_jax.grid import BILINEAR_EXCESS, DistanceField, Grid, distance_field
+from adwa_jax.grid import DistanceField
 from adwa_jax.obstacles import Sensed
 from adwa_jax.presets import Preset, extended, paper
 from adwa_jax.rollout import RobotState
@@ -20,6 +20,7 @@ from adwa_jax.window import RobotLimits
 from tests.benchmarks.inputs import Arrays, scenes
 from tests.benchmarks.timing import Figure, contest, in_threads, rate_of
 from tests.benchmarks.yardstick import Yardstick, doubled, peer
+from tests.yardstick_scenarios import field_of
 from tuning.engine import usable_cores
 
 ROBOT = RobotLimits(0.25, 0.0, 1.0, 1.5, acceleration=1.0, yaw_acceleration=3.0, brake=1.0, yaw_brake=1e9)
@@ -42,7 +43,7 @@ def prepared(arrays: Arrays) -> Scene:
 
     @jax.jit
     def fields(maps: jax.Array) -> DistanceField:
-        return jax.lax.map(yardsticks_field, maps)
+        return jax.lax.map(field_of, maps)
 
     def scene(state: jax.Array, local: jax.Array, goal: jax.Array, disc: jax.Array) -> tuple:
         count = disc.shape[0]
@@ -53,14 +54,6 @@ def prepared(arrays: Arrays) -> Scene:
 
     rest = jax.vmap(scene)(single["state"], single["local"], single["goal"], single["disc"])
     return jax.block_until_ready((fields(single["maps"]), *rest))
-
-
-def yardsticks_field(occupied: jax.Array) -> DistanceField:
-    """Its lattice lies half a step off ours, over a ring of occupied cells, and its look-up is not lowered."""
-    ringed = jnp.pad(occupied > 0, 1, constant_values=True)
-    side = jnp.int32(ringed.shape[0])
-    fine = distance_field(Grid(ringed, side, side, jnp.float32(1.0), jnp.full(2, -1.0)), subdivision=8)
-    return DistanceField(fine.distance[1::2, 1::2] + BILINEAR_EXCESS * 0.25, jnp.float32(0.25), jnp.full(2, -0.875))
 
 
 def decider(values: Constants, options: Options) -> Callable[[Scene], Decision]:

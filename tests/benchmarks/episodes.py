@@ -21,36 +21,14 @@ from adwa_jax.presets import extended, paper
 from adwa_jax.scenario import Scenario
 from scenarios.padding import stack
 from scenarios.suite import make_suite
-from tests.benchmarks.decisions import yardsticks_field
 from tests.benchmarks.inputs import scenarios
 from tests.benchmarks.timing import Figure, contest, rate_of
 from tests.benchmarks.yardstick import Yardstick
 from tests.test_adwa_jax.worlds import plan_by_hand
-from tests.yardstick_scenarios import scenarios_of
+from tests.yardstick_scenarios import LOOP, SAME_END, episode_options, field_of, key_points_of, scenarios_of
 from tuning.engine import Judged, judge_pairs, program_of, usable_cores
 
 BASE = paper()
-LOOP = replace(
-    BASE.constants,
-    robot=replace(BASE.constants.robot, yaw_brake=1e9),  # the yardstick's admissibility has no limit on turning
-    behaviour=replace(BASE.constants.behaviour, stuck_time=1e3),  # nor does it know STUCK
-)
-SAME_END = {Outcome.REACHED: 0, Outcome.HIT_KNOWN: 1, Outcome.HIT_UNKNOWN: 2, Outcome.HIT_MOVER: 3, Outcome.STUCK: 4,
-            Outcome.TIMEOUT: 4, Outcome.NO_PATH: 5}  # fmt: skip
-NEAR_TIE = 1e-4  # a share of a score by which two candidates may differ and yet be exchanged by rounding
-
-
-def yardstick_options() -> list[str]:
-    """Our constants in the yardstick's words."""
-    weights, robot, behaviour, dwa = LOOP.weights, LOOP.robot, LOOP.behaviour, BASE.options.dwa
-    options = {
-        "H": dwa.horizon_steps, "nv": dwa.v_samples, "nw": dwa.yaw_rate_samples, "norm": dwa.normalisation,
-        "wl": weights.local_heading, "wD": weights.clearance, "wv": weights.velocity, "wg": weights.global_heading,
-        "dcap": behaviour.clearance_cap, "los": behaviour.clearance_margin, "kptol": behaviour.keypoint_tolerance,
-        "range": behaviour.sensor_range, "dt": behaviour.dt, "rr": robot.radius, "vmax": robot.v_max,
-        "wmax": robot.yaw_rate_max, "amax": robot.acceleration, "alpha": robot.yaw_acceleration,
-    }  # fmt: skip
-    return [word for name, value in options.items() for word in (f"--{name}", str(value))]
 
 
 def against_yardstick(yardstick: Yardstick | None, count: int = 1000) -> list[Figure]:
@@ -68,7 +46,7 @@ def against_yardstick(yardstick: Yardstick | None, count: int = 1000) -> list[Fi
 
     contestants = {"adwa-jax": ours}
     if yardstick:
-        contestants["C++ AVX-512"] = lambda: yardstick.rate("episodes", arrays, *yardstick_options())
+        contestants["C++ AVX-512"] = lambda: yardstick.rate("episodes", arrays, *episode_options())
     figures = contest("closed loop 25 × 25, planning included", "episodes", contestants, rounds=3)
     figures[0].note = f"{steps['adwa-jax']:,.0f} control steps a second"
     return figures
@@ -77,7 +55,7 @@ def against_yardstick(yardstick: Yardstick | None, count: int = 1000) -> list[Fi
 def agreement(yardstick: Yardstick, count: int = 1000) -> dict[str, Any]:
     """How many episodes end as the yardstick's do, from its plans and its field: the closed loop alone."""
     arrays = scenarios(count)
-    theirs = yardstick.items("episodes", arrays, "--impl", "scalar", *yardstick_options())
+    theirs = yardstick.items("episodes", arrays, "--impl", "scalar", *episode_options())
     kept = yardstick.items("keypts", {"maps": arrays["maps"]}, "--los", str(LOOP.behaviour.clearance_margin))
     worlds = scenarios_of(**arrays)
     options = program_of(worlds[0], LOOP, BASE.options).options
@@ -97,14 +75,12 @@ def agreement(yardstick: Yardstick, count: int = 1000) -> dict[str, Any]:
 
 
 def _by_hand(world: Scenario, key: list) -> tuple[Scenario, np.ndarray, int]:
-    points = np.float32([*key[:-1], world.goal])
-    capacity = world.grid.occupied.size
-    return world, np.pad(points, ((0, capacity - len(points)), (0, 0)), mode="edge"), len(points)
+    return world, key_points_of(key, world), len(key)
 
 
 @jax.jit
 def _plans(worlds: Scenario, points: jax.Array, counts: jax.Array) -> Any:
-    return jax.lax.map(lambda one: plan_by_hand(one[1], one[2], yardsticks_field(one[0].grid.occupied)),
+    return jax.lax.map(lambda one: plan_by_hand(one[1], one[2], field_of(one[0].grid.occupied)),
                        (worlds, points, counts))  # fmt: skip
 
 

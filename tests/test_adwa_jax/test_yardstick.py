@@ -18,7 +18,7 @@ from adwa_jax.astar import SearchOptions, search
 from adwa_jax.constants import DwaOptions, Options
 from adwa_jax.dwa import Decision, Guidance, decide
 from adwa_jax.episode import Outcome
-from adwa_jax.grid import BILINEAR_EXCESS, DistanceField, Grid, distance_field
+from adwa_jax.grid import Grid
 from adwa_jax.heuristic_weight import WeightRule, weight_field
 from adwa_jax.keypoints import key_points, turning_points
 from adwa_jax.obstacles import Sensed
@@ -29,7 +29,15 @@ from adwa_jax.simulate import drive
 from adwa_jax.window import RobotLimits
 from scenarios.padding import stack
 from tests.test_adwa_jax.worlds import plan_by_hand
-from tests.yardstick_scenarios import scenarios_of
+from tests.yardstick_scenarios import (
+    LOOP,
+    LOOP_OPTIONS,
+    SAME_END,
+    episode_options,
+    field_of,
+    key_points_of,
+    scenarios_of,
+)
 
 PEERS = Path(__file__).resolve().parents[3] / "shared" / "peers"
 pytestmark = [
@@ -123,20 +131,14 @@ def test_dwa_choice_equals_the_double_precision_oracles_but_for_near_ties(yardst
         assert scores[decisions.index[scene]] - scores[expected[scene]] < 1e-5
 
 
-SAME_END = {
-    Outcome.REACHED: 0, Outcome.HIT_KNOWN: 1, Outcome.HIT_UNKNOWN: 2, Outcome.HIT_MOVER: 3, Outcome.STUCK: 4,
-    Outcome.TIMEOUT: 4, Outcome.NO_PATH: 5,
-}  # fmt: skip
-
-
 def test_episodes_from_the_yardsticks_plans_end_as_its_own(yardstick):
     """The closed loop alone: its key points and its field's lattice, look-up and margin differ from ours."""
     scenes = yardstick.inputs.make_scenarios(40)
-    theirs = yardstick.run("episodes", "--impl", "scalar", *_episode_options(), **scenes)
+    theirs = yardstick.run("episodes", "--impl", "scalar", *episode_options(), **scenes)
     margin = str(LOOP.behaviour.clearance_margin)
     kept = yardstick.run("keypts", "--los", margin, maps=scenes["maps"])
     worlds = scenarios_of(**scenes)
-    points = np.stack([_key_points(record["key"], world) for record, world in zip(kept, worlds, strict=True)])
+    points = np.stack([key_points_of(record["key"], world) for record, world in zip(kept, worlds, strict=True)])
     counts = np.int32([len(record["key"]) for record in kept])
     assert counts.tolist() == [record["keypoints"] for record in theirs]
 
@@ -152,34 +154,8 @@ def test_episodes_from_the_yardsticks_plans_end_as_its_own(yardstick):
     assert np.mean(apart < 0.02) >= 0.85
 
 
-LOOP = replace(
-    paper().constants,
-    robot=replace(paper().constants.robot, yaw_brake=1e9),  # its admissibility has no limit on turning
-    behaviour=replace(paper().constants.behaviour, stuck_time=1e3),  # nor does it know STUCK
-)
-LOOP_OPTIONS = paper().options
-
-
-def _episode_options() -> list[str]:
-    weights, robot, behaviour, dwa = LOOP.weights, LOOP.robot, LOOP.behaviour, LOOP_OPTIONS.dwa
-    options = {
-        "H": dwa.horizon_steps, "nv": dwa.v_samples, "nw": dwa.yaw_rate_samples, "norm": dwa.normalisation,
-        "wl": weights.local_heading, "wD": weights.clearance, "wv": weights.velocity, "wg": weights.global_heading,
-        "dcap": behaviour.clearance_cap, "los": behaviour.clearance_margin, "kptol": behaviour.keypoint_tolerance,
-        "range": behaviour.sensor_range, "dt": behaviour.dt, "rr": robot.radius, "vmax": robot.v_max,
-        "wmax": robot.yaw_rate_max, "amax": robot.acceleration, "alpha": robot.yaw_acceleration,
-    }  # fmt: skip
-    return [word for name, value in options.items() for word in (f"--{name}", str(value))]
-
-
-def _key_points(key, world) -> np.ndarray:
-    """[P, 2] key points with the goal itself as the last, which repeats."""
-    points = np.float32([*key[:-1], world.goal])
-    return np.pad(points, ((0, world.grid.occupied.size - len(points)), (0, 0)), mode="edge")
-
-
 def _drive_from(world, points, count):
-    return drive(world, plan_by_hand(points, count, _yardsticks_field(world.grid.occupied)), LOOP, LOOP_OPTIONS)
+    return drive(world, plan_by_hand(points, count, field_of(world.grid.occupied)), LOOP, LOOP_OPTIONS)
 
 
 def _plan_corner_to_corner(occupied):
@@ -212,14 +188,5 @@ def _decide_one(occupied, state, local, goal, disc) -> Decision:
     constants = paper().constants
     constants = replace(constants, weights=ScoreWeights(0.4, 0.2, 0.2, 0.1), robot=robot,
                         behaviour=replace(constants.behaviour, dt=0.1, clearance_cap=1.0))
-    return decide(RobotState(*state), Guidance(local, goal), _yardsticks_field(occupied), sensed, constants,
+    return decide(RobotState(*state), Guidance(local, goal), field_of(occupied), sensed, constants,
                   Options(dwa=DwaOptions(11, 21, 30, "sum")))
-
-
-def _yardsticks_field(occupied) -> DistanceField:
-    """Its lattice lies half a step off ours, over a ring of occupied cells, and its look-up is not lowered."""
-    ringed = jnp.pad(occupied.astype(bool), 1, constant_values=True)
-    side = jnp.int32(ringed.shape[0])
-    fine = distance_field(Grid(ringed, side, side, jnp.float32(1.0), jnp.full(2, -1.0)), subdivision=8)
-    distance = fine.distance[1::2, 1::2] + BILINEAR_EXCESS * 0.25
-    return DistanceField(distance, jnp.float32(0.25), jnp.full(2, -0.875))

@@ -131,7 +131,7 @@ def test_a_suite_without_scenarios_is_refused():
 
 def test_a_program_follows_from_its_scenario_alone():
     programs = {name: program_of(scenario, paper().constants, paper().options)
-               for name, scenario in zip(SUITE.names, SUITE.scenarios, strict=True)}  # fmt: skip
+                for name, scenario in zip(SUITE.names, SUITE.scenarios, strict=True)}  # fmt: skip
     assert len(set(programs.values())) == 2
     assert programs["large"] != programs["small"] == programs["detour"] == programs["walled"]
     assert programs["large"].shape.rows == 24
