@@ -35,6 +35,8 @@ SCORE = tuple(field.name for field in fields(ScoreWeights))
 RULE = tuple(field.name for field in fields(WeightRule))
 BEHAVIOUR = ("clearance_cap", "clearance_margin", "static_margin", "mover_margin", "mover_growth", "mover_cap",
              "lookahead", "route_margin")  # fmt: skip
+# Counts of `DwaOptions`: another value compiles anew.
+COUNTS = ("v_samples", "yaw_rate_samples", "horizon_steps")
 OPTIONAL = ("dense_ratio", "sparse_ratio")
 REPLACED = ("velocity", "global_heading")  # by progress
 # What has an effect only with a rule.
