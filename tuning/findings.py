@@ -1,0 +1,84 @@
+"""What the analysis of a job finds, as data: what reports draw and commands print.
+
+Dimension letters: D parameters; O objectives; G generations; R resamples of the scenarios.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from tuning.objectives import Goals
+
+
+class Interval(NamedTuple):
+    """An estimate with its 95 % interval, in the measure's own units; NaN where no scenario counts."""
+
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """Of one candidate on one suite."""
+
+    scenarios: int
+    success: Interval  # Wilson
+    objectives: tuple[Interval, ...]  # O, in the order of the goals; a rate's by Wilson, others by bootstrap
+    feasible: bool  # all constraints hold
+
+
+@dataclass(frozen=True)
+class Member:
+    """A candidate of the front, or the default constants."""
+
+    row: int  # of the training evaluations
+    values: np.ndarray  # [D]
+    training: Judgement
+    held_out: Judgement | None  # None: not driven there
+    non_dominated: float  # share of the resamples in which no other candidate dominates it
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One member, picked by a rule."""
+
+    rule: str  # of choice.RULES
+    member: int  # index into the front
+    stability: float  # share of the resamples in which the same member is picked
+    reason: str  # one sentence for people
+
+
+@dataclass(frozen=True)
+class HypervolumeCurve:
+    """How much of the objectives' space the candidates so far dominate."""
+
+    episodes: np.ndarray  # [G] driven up to and with each generation
+    value: np.ndarray  # [G]
+    reference: np.ndarray  # [O] the point it is measured from, minimised objectives
+
+
+@dataclass(frozen=True)
+class Findings:
+    """All of it."""
+
+    parameters: tuple[str, ...]  # D
+    goals: Goals
+    default: Member
+    front: tuple[Member, ...]  # best first objective first
+    choices: tuple[Choice, ...]
+    recommended: int  # index into `choices`
+    hypervolume: HypervolumeCurve
+    importance: np.ndarray  # [D, O] in [0, 1]: share of an objective's variation that a parameter explains by itself
+    compared: "Comparison | None"  # the recommended member against the default, held out; None: not driven there
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Paired differences, recommended − default, on common scenarios, with 95 % intervals."""
+
+    success: Interval  # Newcombe's for paired proportions
+    objectives: tuple[Interval, ...]  # O, by bootstrap over scenarios
+    better_on_all: bool  # whether some front member beats the default on every objective, point estimates
+    why_not: str  # the sentence for it, if none does; else empty
