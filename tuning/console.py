@@ -33,7 +33,8 @@ UNITS = {  # of the measures a table shows
     "time": "s", "length": "m", "length_ratio": "", "spl": "", "breaking_points": "", "danger_points": "",
     "least_clearance": "m", "mean_clearance": "m", "curvature": "1/m", "angle_over_length": "rad/m",
     "command_variation": "", "jerk": "m/s³", "barn_score": "", "brakings": "", "replans": "", "hit_while_stopped": "",
-    "optimal_length": "m", "planned_length": "m", "key_point_length": "m", "key_point_count": "", "expansions": "",
+    "optimal_length": "m", "planned_length": "m", "planned_length_ratio": "", "key_point_length": "m",
+    "key_point_count": "", "expansions": "",
 }  # fmt: skip
 
 

@@ -68,7 +68,7 @@ def judge_pairs(scenarios: Sequence[Scenario], candidates: Sequence[Constants], 
     table = _Table(len(candidates), len(scenarios), progress)
     count = usable_cores() if workers is None else workers
     plans = 0
-    for program, pairs in _by_program(scenarios, candidates, options).items():
+    for program, pairs in pairs_by_program(scenarios, candidates, options).items():
         if table.stop:
             break
         planner = Planner(scenarios, candidates, program.options, program.shape, pairs)
@@ -99,8 +99,8 @@ def lanes_of(program: Program) -> int:
     return next((lanes for limit, lanes in LANES if side <= limit), FEWEST_LANES)
 
 
-def _by_program(scenarios: Sequence[Scenario], candidates: Sequence[Constants],
-                options: Options) -> dict[Program, list[Pair]]:
+def pairs_by_program(scenarios: Sequence[Scenario], candidates: Sequence[Constants],
+                     options: Options) -> dict[Program, list[Pair]]:
     """Pairs of one program together: scenario after scenario, those with one plan side by side, so that plans are
     needed one after another and none for long.
     """

@@ -92,6 +92,7 @@ def planned_columns(planned: Plan) -> dict[str, jax.Array]:
     return {
         "optimal_length": planned.optimal_length,
         "planned_length": planned.length,
+        "planned_length_ratio": planned.length / jnp.where(planned.optimal_length > 0, planned.optimal_length, 1.0),
         "key_point_length": planned.key_point_length,
         "key_point_count": planned.key_point_count,
         "expansions": planned.search.expansions,
