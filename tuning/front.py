@@ -45,9 +45,9 @@ def thinned(objectives: np.ndarray, limit: int) -> np.ndarray:
     taken = list(dict.fromkeys(np.argmin(points, axis=0).tolist()))[:limit]
     apart = np.min([_distance(points, points[index]) for index in taken], axis=0)
     while len(taken) < min(limit, len(points)):
+        apart[taken] = -1.0  # equals of what was taken lie at 0
         taken.append(int(np.argmax(apart)))
         apart = np.minimum(apart, _distance(points, points[taken[-1]]))
-        apart[taken] = -1.0
     return np.sort(np.array(taken))
 
 

@@ -13,7 +13,19 @@ from adwa_jax.presets import Preset
 NOSE = 0.325  # forward_point_distance, DWB's own [m]: PathAlign and GoalAlign judge a point so far ahead of the robot
 MAP_GRID = 0.5  # by which DWB multiplies the scale of critics that count metres on the costmap
 LARGEST_COST = 252.0  # of a costmap's cell beside those in which the robot touches an obstacle
+LEAST_SCALE = 1e-6  # of the critic that refuses collisions: DWB skips a critic whose scale is 0
 DECAY = 3.0  # the inflated cost has fallen to e⁻³ = 5 % at the clearance cap
+
+WINDOW = [
+    "      # Candidates: the window of one control step, held over the predicted time (eq. 6). Exact.",
+    '      trajectory_generator_name: "dwb_plugins::LimitedAccelGenerator"',
+]
+RAMPS = [
+    "      # Candidates: approached within the limits as they are predicted, and commanded step by step. Approximate:",
+    "      # DWB spreads its samples over all that can be reached in sim_time, this planner from rest to full speed.",
+    '      trajectory_generator_name: "dwb_plugins::StandardTrajectoryGenerator"',
+    "      limit_vel_cmd_in_traj: true",
+]
 
 
 def nav2_text(preset: Preset) -> str:
@@ -29,7 +41,7 @@ def scales(preset: Preset) -> dict[str, float]:
     divides them by sums over the candidates: w / (the most a term can be) per metre, radian or step backward.
     """
     constants, rules = preset.constants, preset.options.rules
-    weights, behaviour = constants.weights, constants.behaviour
+    weights = constants.weights
     farthest = float(constants.robot.v_max) * _horizon(preset)
     drive = float(weights.progress if rules.progress else weights.velocity)
     found = {
@@ -37,10 +49,10 @@ def scales(preset: Preset) -> dict[str, float]:
         "PathDist": float(weights.on_route) / farthest / MAP_GRID if rules.progress else 0.0,
         "PathAlign": float(weights.local_heading) / (math.pi * NOSE) / MAP_GRID,
         "GoalAlign": 0.0 if rules.progress else float(weights.global_heading) / (math.pi * NOSE) / MAP_GRID,
-        _obstacle_critic(constants): float(weights.clearance) / LARGEST_COST,
+        _obstacle_critic(constants): max(float(weights.clearance) / LARGEST_COST, LEAST_SCALE),
         "PreferForward": float(weights.forward) if rules.reverse else 0.0,
     }
-    return {name: scale for name, scale in found.items() if scale > 0.0 or name == _obstacle_critic(constants)}
+    return {name: scale for name, scale in found.items() if scale > 0.0}
 
 
 def _obstacle_critic(constants: Constants) -> str:
@@ -66,17 +78,17 @@ def _number(value: object) -> str:
 
 
 def _header(preset: Preset) -> list[str]:
+    ramp = preset.options.rules.ramp
     return [
         "# Nav2 parameters: merge into your own file, beside planner, costmap layers and sensors.",
         "#",
-        "# Carried over exactly: velocity and acceleration limits, control period, predicted time and its steps, samples"
-        " of speed and turn,",
-        "#   how candidates are made (window or ramps), when the robot counts as stuck, the cost of backing up.",
-        "# Approximate: every other scale (this planner's terms are larger where better, a critic's cost is smaller;"
-        " DWB counts Manhattan",
-        "#   metres on the costmap), and inflation in the place of clearance. Try these on your robot before you rely on"
-        " them.",
+        "# Carried over exactly: velocity and acceleration limits, control period, predicted time and its steps, when",
+        "#   the robot counts as stuck, the cost of backing up" + ("." if ramp else ", samples of speed and turn."),
+        "# Approximate: all other scales (a term of this planner is larger where better, a critic's cost smaller; DWB",
+        "#   counts Manhattan metres on the costmap), inflation in the place of clearance"
+        + ("; how samples are spread." if ramp else "."),
         *_not_carried(preset),
+        "# Try it in simulation before you rely on it.",
     ]
 
 
@@ -133,16 +145,12 @@ def _limits(preset: Preset) -> list[str]:
 
 def _generator(preset: Preset) -> list[str]:
     dt, dwa = float(preset.constants.behaviour.dt), preset.options.dwa
-    ramp = preset.options.rules.ramp
-    kind, why = ("StandardTrajectoryGenerator", "approached within the limits as they are predicted") if ramp else (
-        "LimitedAccelGenerator", "the window of one control step, held over the horizon (eq. 6)")  # fmt: skip
     return [
-        f"      # Candidates: {why}. Exact.",
-        f'      trajectory_generator_name: "dwb_plugins::{kind}"',
-        *([] if ramp else [f"      sim_period: {_number(dt)}"]),
+        *(RAMPS if preset.options.rules.ramp else [*WINDOW, f"      sim_period: {_number(dt)}"]),
         f"      vx_samples: {dwa.v_samples}",
         "      vy_samples: 1",
         f"      vtheta_samples: {dwa.yaw_rate_samples}",
+        "      # Exact.",
         f"      sim_time: {_number(_horizon(preset))}",
         "      discretize_by_time: true",
         f"      time_granularity: {_number(dt * _stride(preset))}",
