@@ -75,6 +75,15 @@ def test_candidates_stay_paired():
     assert repeats[:, 0].std() > 0.01
 
 
+def test_candidates_that_did_the_same_have_the_same_scores():
+    """Sums of products may round otherwise from column to column."""
+    lengths = np.random.default_rng(0).random(97).astype(np.float32)
+    judged = evaluations(np.ones((37, 97)), np.tile(lengths, (37, 1)))
+    goals = Goals((Statistic("length_ratio", "min"), Statistic("length_ratio", "min", 0.2)))
+    found = resampled_scores(goals, judged.columns, judged.done, draws(97, 50, seed=0)).objectives
+    np.testing.assert_array_equal(found, np.broadcast_to(found[:, :1], found.shape))
+
+
 def test_the_interval_of_a_mean_is_about_that_of_the_normal_law():
     values = np.random.default_rng(1).normal(size=400)
     judged = evaluations(np.ones((1, 400)), values[None, :])

@@ -140,7 +140,7 @@ def test_a_reason_says_that_no_candidate_is_feasible():
 @pytest.mark.parametrize(("given", "place", "words"), [
     ({"rule": "best"}, "rule", "knee"),
     ({"at_least": 1.2}, "at_least", "less than or equal to 1"),
-    ({"at_least": float("nan")}, "at_least", "greater than or equal to 0"),
+    ({"at_least": float("nan")}, "at_least", "less than or equal to 1"),
     ({"at_least": "0.9"}, "at_least", "number"),
     ({"weights": {"success": -1.0}}, "weights", "greater than or equal to 0"),
     ({"weights": {"success": float("inf")}}, "weights", "finite"),
