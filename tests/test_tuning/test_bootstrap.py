@@ -76,11 +76,11 @@ def test_candidates_stay_paired():
 
 
 def test_candidates_that_did_the_same_have_the_same_scores():
-    """Sums of products may round otherwise from column to column."""
-    lengths = np.random.default_rng(0).random(97).astype(np.float32)
-    judged = evaluations(np.ones((37, 97)), np.tile(lengths, (37, 1)))
-    goals = Goals((Statistic("length_ratio", "min"), Statistic("length_ratio", "min", 0.2)))
-    found = resampled_scores(goals, judged.columns, judged.done, draws(97, 50, seed=0)).objectives
+    """Products of matrices add up in another order from column to column."""
+    times = np.tile(np.random.default_rng(0).random(1024), (37, 1))
+    judged = evaluations(np.ones((37, 1024)), np.ones(37), time=times)
+    goals = Goals((Statistic("time", "min"), Statistic("time", "min", 0.2)))
+    found = resampled_scores(goals, judged.columns, judged.done, draws(1024, 33, seed=0)).objectives
     np.testing.assert_array_equal(found, np.broadcast_to(found[:, :1], found.shape))
 
 
