@@ -65,7 +65,7 @@ class SizeReport:
     results: Results
 
 
-def run_demo(out: Path, count: int, seed: int, quiet: bool) -> list[SizeReport]:
+def run_claims(out: Path, count: int, seed: int, quiet: bool) -> list[SizeReport]:
     """Write tables, pictures and an animation to `out`, and print the tables."""
     out.mkdir(parents=True, exist_ok=True)
     config = paper()
