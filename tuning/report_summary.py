@@ -170,7 +170,7 @@ def shown(statistic: Statistic, interval: Interval) -> str:
     if not np.isfinite(value):
         return NONE
     digits, unit = _decimals(statistic, value), unit_of(statistic)
-    return f"{value:.{digits}f}{f' {unit}' * bool(unit)} [{low:.{digits}f}, {high:.{digits}f}]"
+    return f"{value:.{digits}f}{f' {unit}' * bool(unit)} [{low:.{digits}f},\N{NO-BREAK SPACE}{high:.{digits}f}]"
 
 
 def shown_difference(statistic: Statistic, interval: Interval) -> str:
@@ -179,7 +179,7 @@ def shown_difference(statistic: Statistic, interval: Interval) -> str:
     if not np.isfinite(value):
         return NONE
     digits = _decimals(statistic, max(abs(low), abs(high)))
-    return f"{value:+.{digits}f} [{low:+.{digits}f}, {high:+.{digits}f}]"
+    return f"{value:+.{digits}f} [{low:+.{digits}f},\N{NO-BREAK SPACE}{high:+.{digits}f}]"
 
 
 def _decimals(statistic: Statistic, value: float) -> int:
