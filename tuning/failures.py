@@ -31,8 +31,8 @@ def failure_pictures(suite: Suite, preset: Preset, results: Results, folder: Pat
                      y_down: bool = False) -> tuple[FailurePicture, ...]:
     """Drive the worst scenarios again and write a picture of each to the folder.
 
-    results: of the suite under the preset. Failures come first, of every outcome one before a second of any; where there
-    are fewer than `limit`, the longest detours among the successes follow.
+    results: of the suite under the preset. Failures come first, of every outcome one before a second of any; where
+    there are fewer than `limit`, the longest detours among the successes follow.
     """
     return tuple(_pictured(suite, preset, results, index, folder, y_down) for index in worst(results)[:limit])
 

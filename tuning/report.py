@@ -101,14 +101,13 @@ def _sweeps(findings: Findings, training: Evaluations) -> str:
     names = ", ".join(training.parameters[sweep.parameter].replace("_", " ") for sweep in found)
     return html.drawn(figures.sweep_figure(findings.goals, training, found),
                       f"Curves of every objective against each of {names}, with 95 % intervals.",
-                      "One constant varies, all others keep their defaults. Dashed: the default; shaded: 95 % intervals, "
-                      "Wilson's for rates, else by bootstrap over the scenarios.")  # fmt: skip
+                      "One constant varies, all others keep their defaults. Dashed: the default; shaded: 95 % "
+                      "intervals, Wilson's for rates, else by bootstrap over the scenarios.")  # fmt: skip
 
 
 def _progress(findings: Findings) -> str:
     curve, objectives = findings.hypervolume, findings.goals.objectives
-    point = ", ".join(f"{figures.measure_name(statistic)} {float(figures.in_units(statistic, statistic.sign * value)):.4g}"
-                      f"{figures.unit_of(statistic)}"
+    point = ", ".join(f"{figures.name_and_unit(statistic)} {figures.in_units(statistic, statistic.sign * value):.4g}"
                       for statistic, value in zip(objectives, curve.reference, strict=True))  # fmt: skip
     return html.drawn(figures.hypervolume_figure(curve),
                       f"Hypervolume against episodes, from {curve.value[0]:.3g} to {curve.value[-1]:.3g}.",
@@ -120,16 +119,16 @@ def _importance(findings: Findings) -> str:
     return html.drawn(figures.importance_figure(findings),
                       "Heat map of how much each constant explains of each objective.",
                       "How much of an objective's variation over the candidates a constant explains by itself, in "
-                      "percent. What rows do not add up to comes from constants acting together, and from chance.")
+                      "percent. What a column lacks of 100 comes from constants acting together, and from chance.")
 
 
 def _optimism(findings: Findings, held_out: Evaluations | None, held_out_rows: np.ndarray) -> str:
     if held_out is None or figures.recommended(findings).held_out is None:
-        return html.paragraph("Nothing was driven on held-out scenarios: how far the training values flatter is not known.")
+        return html.paragraph("Nothing was driven on held-out scenarios: how far training values flatter is not known.")
     picture = html.drawn(figures.optimism_figure(findings),
                          "Held-out against training value of the front, the default and the recommended constants.",
-                         "On the dashed line both are equal; how far a point is off to the bad side is its optimism gap. "
-                         "Bars: 95 % intervals.")  # fmt: skip
+                         "On the dashed line both are equal; how far a point is off to the bad side is its optimism "
+                         "gap. Bars: 95 % intervals.")  # fmt: skip
     return picture + "\n" + summary.outcomes_table(findings, held_out, held_out_rows)
 
 
@@ -137,8 +136,8 @@ def _failures(gallery: Sequence[FailurePicture]) -> str:
     if not gallery:
         return ""
     pictures = "\n".join(html.picture(shown.path.read_bytes(), shown.caption, shown.caption) for shown in gallery)
-    return (html.paragraph("The worst scenarios of the recommended constants: failures first, then the longest detours.")
-            + f'\n<div class="gallery">\n{pictures}\n</div>')  # fmt: skip
+    heading = "The worst scenarios of the recommended constants: failures first, then the longest detours."
+    return f'{html.paragraph(heading)}\n<div class="gallery">\n{pictures}\n</div>'
 
 
 def _gradients(findings: Findings, agreement: Mapping[str, np.ndarray] | None) -> str:
@@ -147,9 +146,9 @@ def _gradients(findings: Findings, agreement: Mapping[str, np.ndarray] | None) -
     low, high = np.min(agreement["cosine"]), np.max(agreement["cosine"])
     picture = html.drawn(figures.agreement_figure(agreement),
                          f"Agreement of gradients at each start; cosines from {low:.2f} to {high:.2f}.",
-                         "Gradient of the relaxed planner beside that of the real one, estimated by evolution strategies. "
-                         "Cosine 1: the same direction; an interval that holds 0: the relaxed gradient cannot be trusted "
-                         "there.")  # fmt: skip
+                         "Gradient of the relaxed planner beside that of the real one, estimated by evolution "
+                         "strategies. Cosine 1: the same direction; an interval that holds 0: the relaxed gradient "
+                         "cannot be trusted there.")  # fmt: skip
     return picture + "\n" + html.folded("Both gradients", *_gradient_tables(findings.parameters, agreement))
 
 

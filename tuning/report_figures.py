@@ -24,11 +24,10 @@ from scenarios.drawing import (
     figure_of,
     new_figure,
 )
-from tuning.bootstrap import draws, percentile_interval, resampled
+from tuning.analysis import judgement
 from tuning.console import UNITS
 from tuning.evaluations import Evaluations
-from tuning.findings import Findings, HypervolumeCurve, Interval, Judgement, Member
-from tuning.intervals import wilson
+from tuning.findings import Findings, HypervolumeCurve, Judgement, Member
 from tuning.objectives import RATES, Goals, Statistic, estimate
 
 if TYPE_CHECKING:
@@ -38,7 +37,7 @@ if TYPE_CHECKING:
 COLUMNS = 3  # panels side by side
 GREY = "#999999"
 COLOURS = "cividis"  # equal steps in lightness: also for the colour-blind, and in grey
-RESAMPLES = 400  # for the intervals of a sweep
+SEED = 0  # of the resamples behind the intervals of a sweep
 DEFAULT = {"marker": "s", "markersize": 7, "color": BLACK}
 FRONT = {"marker": "o", "markersize": 5, "color": BLUE}
 CHOSEN = {"marker": "*", "markersize": 13, "color": VERMILLION, "markeredgecolor": BLACK}
@@ -57,9 +56,13 @@ def measure_name(statistic: Statistic) -> str:
 
 def axis_label(statistic: Statistic) -> str:
     """Name, unit, and which way is better."""
+    return f"{name_and_unit(statistic)}, {'less' if statistic.direction == 'min' else 'more'} is better"
+
+
+def name_and_unit(statistic: Statistic) -> str:
+    """For axes and headings."""
     unit = unit_of(statistic)
-    better = "less" if statistic.direction == "min" else "more"
-    return f"{measure_name(statistic)}{f' [{unit}]' * bool(unit)}, {better} is better"
+    return measure_name(statistic) + (f" [{unit}]" if unit else "")
 
 
 def unit_of(statistic: Statistic) -> str:
@@ -68,13 +71,13 @@ def unit_of(statistic: Statistic) -> str:
 
 
 def in_units(statistic: Statistic, value: Any) -> Any:
-    """A rate in percent, all else as it is."""
-    return 100.0 * np.asarray(value) if statistic.measure in RATES else np.asarray(value)
+    """A rate in percent, all else as it is; never −0."""
+    return (100.0 if statistic.measure in RATES else 1.0) * np.asarray(value, np.float64) + 0.0
 
 
 def front_figure(findings: Findings, training: Evaluations | None = None) -> "Figure":
-    """Every pair of objectives: the front, the default constants and the recommended ones, a line from each to its value
-    on the held-out suite; all candidates in grey if `training` is given. One objective: by candidate.
+    """Every pair of objectives: the front, the default constants and the recommended ones, a line from each to its
+    value on the held-out suite; all candidates in grey if `training` is given. One objective: by candidate.
     """
     objectives = findings.goals.objectives
     if len(objectives) == 1:
@@ -116,7 +119,8 @@ def parallel_figure(findings: Findings, ax: "Axes | None" = None) -> "Figure":
         ax.plot(line, color=shades.to_rgba(value), linewidth=1.2, alpha=0.8, zorder=2)
     ax.plot(lines[-1], color=BLACK, linewidth=1.8, linestyle="--", zorder=3, label="default constants")
     best = lines[findings.choices[findings.recommended].member]
-    ax.plot(best, linewidth=2.4, zorder=4, label="recommended", **CHOSEN | {"markersize": 9})
+    style: dict[str, Any] = CHOSEN | {"markersize": 9}
+    ax.plot(best, linewidth=2.4, zorder=4, label="recommended", **style)
     _dress_parallel(ax, names, low, high, len(findings.parameters))
     bar = figure_of(ax).colorbar(shades, ax=ax, pad=0.01, shrink=0.8)
     bar.set_label(axis_label(objectives[0]), fontsize=FONT)
@@ -151,20 +155,20 @@ def sweeps(training: Evaluations, fewest: int = 3) -> list[Sweep]:
 
 
 def sweep_figure(goals: Goals, training: Evaluations, found: Sequence[Sweep]) -> "Figure":
-    """§3.4: each parameter in turn (down) against each objective (across), with 95 % intervals; the default is dashed."""
+    """§3.4: each parameter in turn (down) against each objective (across), with 95 % intervals; default dashed."""
     columns, rows = len(goals.objectives), len(found)
     figure = new_figure((2.5 * columns + 0.4, 2.0 * rows + 0.5))
     grid = figure.subplots(rows, columns, squeeze=False)
     for line, sweep in zip(grid, found, strict=True):
-        name = training.parameters[sweep.parameter]
-        for ax, statistic in zip(line, goals.objectives, strict=True):
-            points = in_units(statistic, [interval_of(statistic, training, row) for row in sweep.rows])
-            place = training.values[sweep.rows, sweep.parameter]
+        place = training.values[sweep.rows, sweep.parameter]
+        judged = [judgement(training, int(row), goals, SEED).objectives for row in sweep.rows]
+        for ax, statistic, intervals in zip(line, goals.objectives, zip(*judged, strict=True), strict=True):
+            points = in_units(statistic, intervals)
             ax.fill_between(place, points[:, 1], points[:, 2], color=SKY, alpha=0.4, linewidth=0)
             ax.plot(place, points[:, 0], color=BLUE, marker="o", markersize=3, linewidth=1.4)
             ax.axvline(training.values[0, sweep.parameter], color=BLACK, linestyle="--", linewidth=0.9)
-            unit = unit_of(statistic)
-            _label_axes(ax, name.replace("_", " "), measure_name(statistic) + f" [{unit}]" * bool(unit))
+            name = training.parameters[sweep.parameter].replace("_", " ")
+            _label_axes(ax, name, name_and_unit(statistic))
     return figure
 
 
@@ -209,8 +213,7 @@ def optimism_figure(findings: Findings) -> "Figure":
         _draw_against([best], index, statistic, ax, CHOSEN | {"label": "recommended"})
         ends = np.array([*ax.get_xlim(), *ax.get_ylim()])
         ax.axline((ends.min(), ends.min()), slope=1.0, color=GREY, linestyle="--", linewidth=1.0, zorder=0)
-        label = axis_label(statistic)
-        _label_axes(ax, f"training: {label}", f"held-out: {label.rpartition(',')[0]}")
+        _label_axes(ax, f"training: {axis_label(statistic)}", f"held-out: {name_and_unit(statistic)}")
     figure_legend(figure, panels)
     return figure
 
@@ -241,17 +244,6 @@ def candidate_objectives(goals: Goals, evaluations: Evaluations) -> np.ndarray:
     whole = evaluations.rows(evaluations.complete)
     return np.stack([in_units(statistic, estimate(statistic, whole.columns, whole.done))
                      for statistic in goals.objectives], axis=1)  # fmt: skip
-
-
-def interval_of(statistic: Statistic, evaluations: Evaluations, row: int) -> Interval:
-    """One candidate's statistic: a rate with its Wilson interval, else by bootstrap over the scenarios."""
-    one = evaluations.rows(np.array([row]))
-    value = float(estimate(statistic, one.columns, one.done)[0])
-    if statistic.measure in RATES and statistic.worst_share == 1.0:
-        count = int(one.done.sum())
-        return Interval(value, *wilson(round(value * count), count))
-    drawn = draws(one.done.shape[1], RESAMPLES, seed=0)
-    return percentile_interval(value, resampled(statistic, one.columns, one.done, drawn)[:, 0])
 
 
 def _panels(count: int, height: float, columns: int = COLUMNS) -> tuple["Figure", list[Any]]:
@@ -316,7 +308,8 @@ def _single_objective(findings: Findings, training: Evaluations | None) -> "Figu
         ax.plot(member.row, value, linestyle="none", label=kind, **style)
         if member.held_out is not None:
             held_out = float(in_units(statistic, member.held_out.objectives[0].value))
-            _draw_held_out(*np.array([[member.row, value], [member.row, held_out]]), style["color"], kind, ax)
+            ends = np.array([member.row, value]), np.array([member.row, held_out])
+            _draw_held_out(*ends, style["color"], kind, ax)
     _label_axes(ax, "candidate, in the order asked for", axis_label(statistic))
     figure_legend(figure_of(ax), [ax])
     return figure_of(ax)

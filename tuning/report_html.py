@@ -32,8 +32,8 @@ def section(anchor: str, heading: str, content: str) -> str:
 def table(caption: str, headings: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     """The first column of a row is its header."""
     head = "".join(f'<th scope="col">{escape(heading)}</th>' for heading in headings)
-    body = "\n".join(f'<tr><th scope="row">{escape(first)}</th>' +
-                     "".join(f"<td>{escape(cell)}</td>" for cell in cells) + "</tr>" for first, *cells in rows)  # fmt: skip
+    body = "\n".join(f'<tr><th scope="row">{escape(first)}</th>{"".join(map(_cell, cells))}</tr>'
+                     for first, *cells in rows)  # fmt: skip
     return (f'<div class="wide"><table><caption>{escape(caption)}</caption>\n<thead><tr>{head}</tr></thead>\n'
             f"<tbody>\n{body}\n</tbody></table></div>")  # fmt: skip
 
@@ -61,3 +61,9 @@ def picture(png: bytes, alt: str, caption: str = "") -> str:
     source = "data:image/png;base64," + base64.b64encode(png).decode("ascii")
     below = f"<figcaption>{escape(caption)}</figcaption>" if caption else ""
     return f'<figure><img src="{source}" alt="{escape(alt)}">{below}</figure>'
+
+
+def _cell(text: str) -> str:
+    """Words flush left, figures flush right."""
+    kind = ' class="text"' if text[:1].isalpha() else ""
+    return f"<td{kind}>{escape(text)}</td>"

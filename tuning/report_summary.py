@@ -10,7 +10,7 @@ from tuning.evaluations import Evaluations
 from tuning.figures import SENTENCES
 from tuning.findings import Comparison, Findings, Interval, Judgement, Member
 from tuning.objectives import RATES, Statistic
-from tuning.report_figures import in_units, measure_name, recommended, unit_of
+from tuning.report_figures import in_units, measure_name, name_and_unit, recommended, unit_of
 from tuning.report_html import table
 
 SUCCESS = Statistic("success", "max")
@@ -144,12 +144,10 @@ def choices_table(findings: Findings) -> str:
 def front_table(findings: Findings) -> str:
     """Every member, its constants and objectives on training, and how surely nothing dominates it."""
     objectives = findings.goals.objectives
-    units = [f"{measure_name(statistic)}{f' [{unit_of(statistic)}]' * bool(unit_of(statistic))}"
-             for statistic in objectives]  # fmt: skip
     rows = [_front_row(str(index), member, objectives) for index, member in enumerate(findings.front, start=1)]
     rows.append(_front_row("default", findings.default, objectives))
     return table("Members of the front; surely: share of the resamples in which none dominates it",
-                 ("member", *units, "surely", *findings.parameters), rows)  # fmt: skip
+                 ("member", *map(name_and_unit, objectives), "surely", *findings.parameters), rows)  # fmt: skip
 
 
 def outcomes_table(findings: Findings, held_out: Evaluations, held_out_rows: np.ndarray) -> str:
@@ -204,8 +202,7 @@ def _differences(findings: Findings, compared: Comparison) -> Iterator[tuple[Sta
 
 def _gap_sentence(training: Judgement, held_out: Judgement) -> str:
     gap = 100.0 * (training.success.value - held_out.success.value)
-    way = "higher" if gap > 0 else "lower"
-    gap_words = "the same" if abs(gap) < 0.05 else f"{abs(gap):.1f} points {way}"
-    return (f"Its success on the {training.scenarios} training scenarios, on which it was picked, is {gap_words} "
-            f"{'as' if gap_words == 'the same' else 'than'} on the {held_out.scenarios} held-out ones (the optimism gap); "
+    way = f"{abs(gap):.1f} points {'higher' if gap > 0 else 'lower'} than"
+    return (f"Its success on the {training.scenarios} training scenarios, on which it was picked, is "
+            f"{'the same as' if abs(gap) < 0.05 else way} on the {held_out.scenarios} held-out ones (the optimism gap); "
             "the held-out value is the one to expect.")  # fmt: skip
