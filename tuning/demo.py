@@ -74,8 +74,8 @@ def sentences(findings: Findings) -> Iterator[str]:
     yield "recommended constants (default):"
     for name, after, before in zip(findings.parameters, best.values, default.values, strict=True):
         yield f"  {name} = {after:.4g} ({before:.4g})"
-    yield (f"success on {best.training.scenarios} training scenarios: {shown(SUCCESS, default.training.success)} before, "
-           f"{shown(SUCCESS, best.training.success)} after")  # fmt: skip
+    yield (f"success on {best.training.scenarios} training scenarios: {shown(SUCCESS, default.training.success)} "
+           f"before, {shown(SUCCESS, best.training.success)} after")  # fmt: skip
     if best.held_out is not None and default.held_out is not None:
         yield (f"success on {best.held_out.scenarios} held-out scenarios: {shown(SUCCESS, default.held_out.success)} "
                f"before, {shown(SUCCESS, best.held_out.success)} after")  # fmt: skip

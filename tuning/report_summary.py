@@ -204,5 +204,5 @@ def _gap_sentence(training: Judgement, held_out: Judgement) -> str:
     gap = 100.0 * (training.success.value - held_out.success.value)
     way = f"{abs(gap):.1f} points {'higher' if gap > 0 else 'lower'} than"
     return (f"Its success on the {training.scenarios} training scenarios, on which it was picked, is "
-            f"{'the same as' if abs(gap) < 0.05 else way} on the {held_out.scenarios} held-out ones (the optimism gap); "
-            "the held-out value is the one to expect.")  # fmt: skip
+            f"{'the same as' if abs(gap) < 0.05 else way} on the {held_out.scenarios} held-out ones (the optimism "
+            "gap); the held-out value is the one to expect.")  # fmt: skip
