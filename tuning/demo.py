@@ -26,7 +26,7 @@ preset = "extended"
 suites = [{{suite = "paper-20", count = 96, seed = {training}}}]
 
 [held_out]   # maps that the search never sees
-suites = [{{suite = "paper-20", count = 256, seed = {held_out}}}]
+suites = [{{suite = "paper-20", count = 192, seed = {held_out}}}]
 
 [parameters]   # weights of the score, and how much room counts as enough [m]
 clearance = {{low = 0.0, high = 0.6}}
@@ -48,9 +48,8 @@ episodes = 6144
 racing = true
 population = 16
 
-[choice]   # weights of the objectives, each in units of the front's range
-rule = "weights"
-weights = {{success = 2.0, length_ratio = 1.0, breaking_points = 1.0, danger_points = 1.0}}
+[choice]   # the member of the front that gives away least of every objective
+rule = "knee"
 """
 
 

@@ -59,7 +59,8 @@ def worst(results: Results) -> list[int]:
 def _pictured(suite: Suite, preset: Preset, results: Results, index: int, folder: Path, y_down: bool) -> FailurePicture:
     driven, name = replay(suite.scenarios[index], preset), suite.names[index]
     if results.reached[index]:
-        caption = f"{name}: a success, but {results.measures['length_ratio'][index]:.2f} times the shortest grid path."
+        ratio = results.measures["length_ratio"][index]
+        caption = f"{name}: a success, its way {ratio:.2f} times the shortest grid path."
         path = save_figure(lambda: _whole_drive(driven, name, y_down), folder / f"scenario_{index}.png")
         return FailurePicture(path, caption)
     cause = cause_by_result(results, index) or (Cause.TURNED if turned_back(driven) else Cause.MOVING)

@@ -47,7 +47,8 @@ def _figure(findings: Findings, training: Evaluations) -> Any:
     figure.update_layout(
         template="plotly_white", height=520, margin={"l": 60, "r": 20, "t": 70, "b": 60}, hovermode="closest",
         paper_bgcolor="white", legend={"orientation": "h", "y": -0.16}, hoverlabel={"align": "left"},
-        xaxis_title=labels[0], yaxis_title=labels[up],
+        xaxis={"title": {"text": labels[0]}, "range": _range(traces, 0)},
+        yaxis={"title": {"text": labels[up]}, "range": _range(traces, up)},
         updatemenus=[_menu("x", labels, traces, 0, 0.0), _menu("y", labels, traces, up, 0.5)],
     )  # fmt: skip
     return figure
@@ -55,19 +56,20 @@ def _figure(findings: Findings, training: Evaluations) -> Any:
 
 def _traces(findings: Findings, training: Evaluations) -> list[tuple[str, np.ndarray, list[str], dict[str, Any]]]:
     """Name, points [N, O], texts N and style of each kind of candidate."""
-    goals, best = findings.goals, recommended(findings)
-    whole = training.values[training.complete]
-    cloud = candidate_objectives(goals, training)
-    kinds = [("candidates", cloud, [_constants(findings, values) for values in whole],
+    goals, best, default = findings.goals, recommended(findings), findings.default
+    others = [member for member in findings.front if member.row not in (best.row, default.row)]
+    rest = np.isin(np.flatnonzero(training.complete), [member.row for member in (*others, best, default)], invert=True)
+    texts = [_constants(findings, values) for values in training.values[training.complete][rest]]
+    kinds = [("candidates", candidate_objectives(goals, training)[rest], texts,
               {"color": GREY, "size": 5, "symbol": "circle"})]  # fmt: skip
     for name, members, style in (
-        ("front", findings.front, {"color": BLUE, "size": 10, "symbol": "circle"}),
-        ("default constants", [findings.default], {"color": BLACK, "size": 11, "symbol": "square"}),
+        ("front", others, {"color": BLUE, "size": 10, "symbol": "circle"}),
+        ("default constants", [default], {"color": BLACK, "size": 11, "symbol": "square"}),
         ("recommended", [best], {"color": VERMILLION, "size": 17, "symbol": "star"}),
     ):
         kinds.append((name, _points(goals, [member.training for member in members]),
                       [_member_text(findings, member) for member in members], style))  # fmt: skip
-    unseen = [member for member in (*findings.front, findings.default) if member.held_out is not None]
+    unseen = [member for member in (*others, best, default) if member.held_out is not None]
     if unseen:
         kinds.append(("held out", _points(goals, [member.held_out for member in unseen if member.held_out is not None]),
                       [_member_text(findings, member) for member in unseen],
@@ -76,9 +78,10 @@ def _traces(findings: Findings, training: Evaluations) -> list[tuple[str, np.nda
 
 
 def _points(goals: Goals, judgements: list[Judgement]) -> np.ndarray:
+    """[N, O], also of none."""
     return np.array([[float(in_units(statistic, part.value))
                       for statistic, part in zip(goals.objectives, judged.objectives, strict=True)]
-                     for judged in judgements])  # fmt: skip
+                     for judged in judgements]).reshape(-1, len(goals.objectives))  # fmt: skip
 
 
 def _scatter(name: str, points: np.ndarray, texts: list[str], style: dict[str, Any], up: int) -> Any:
@@ -92,9 +95,17 @@ def _menu(axis: str, labels: list[str], traces: list[Any], active: int, place: f
     """A list of objectives for one axis."""
     buttons = [{"label": f"{axis}: {label}", "method": "update",
                 "args": [{axis: [_column(points, index) for _, points, _, _ in traces]},
-                         {f"{axis}axis.title.text": label}]}
+                         {f"{axis}axis.title.text": label, f"{axis}axis.range": _range(traces, index)}]}
                for index, label in enumerate(labels)]  # fmt: skip
     return {"buttons": buttons, "active": active, "x": place, "xanchor": "left", "y": 1.14, "yanchor": "top"}
+
+
+def _range(traces: list[Any], index: int) -> list[float]:
+    """Of an axis: that of the members, as candidates far off would press them into a corner."""
+    values = np.concatenate([points[:, index] for _, points, _, _ in traces[1:]])
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    room = 0.1 * (high - low) or 0.02 * abs(high) or 1.0
+    return [low - room, high + room]
 
 
 def _column(points: np.ndarray, index: int) -> list[float | None]:

@@ -123,7 +123,7 @@ def objectives_table(findings: Findings) -> str:
             cells += [shown_difference(statistic, difference), reading(statistic, difference)]
         better = "less" if statistic.direction == "min" else "more"
         rows.append((f"{measure_name(statistic)} ({better} is better)", *cells))
-    return table("Objectives, with 95 % intervals; the change is paired, on held-out scenarios",
+    return table("Objectives, with 95 % intervals, each by itself; the change is paired, on held-out scenarios",
                  ("objective", "training: default", "training: recommended", "held out: default",
                   "held out: recommended", "change", "reading"), rows)  # fmt: skip
 

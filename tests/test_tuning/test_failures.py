@@ -28,11 +28,12 @@ def test_worst_are_drawn_with_the_reason(tmp_path):
                     {"length_ratio": np.array([1.25, 0.0, 0.0]), "hit_while_stopped": np.zeros(3)})  # fmt: skip
     pictures = failure_pictures(suite, paper(), found, tmp_path, limit=3)
     assert [picture.caption.split(".")[0] for picture in pictures] == [
-        "walled: no path", "brief: out of time", "detour: a success, but 1"]  # fmt: skip
+        "walled: no path", "brief: out of time", "detour: a success, its way 1"]  # fmt: skip
     assert "1.25 times the shortest grid path" in pictures[2].caption
     for picture in pictures:
         assert picture.path.parent == tmp_path
-        assert min(Image.open(picture.path).size) > 400
+        with Image.open(picture.path) as image:
+            assert min(image.size) > 400
 
 
 def test_a_candidates_row_is_read_as_an_evaluation():

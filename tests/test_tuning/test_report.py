@@ -164,8 +164,8 @@ def test_pointing_at_a_member_shows_its_constants(browser, interactive):
     box = star.bounding_box()
     page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2, steps=4)
     page.wait_for_selector("#front-plot .hoverlayer .hovertext")
-    shown = page.locator("#front-plot .hoverlayer").inner_text()
-    for text in ("clearance = 0.3125", "local_heading = 0.4375", "progress = 0.8125", "held out"):
+    shown = page.locator("#front-plot .hoverlayer").text_content()
+    for text in ("clearance = 0.3125", "local_heading = 0.4375", "progress = 0.8125", "recommended"):
         assert text in shown
     assert noticed == [interactive.as_uri()]
     page.close()

@@ -79,8 +79,8 @@ def test_the_honest_reading_tells_gap_stability_and_why_none_beats_the_default()
 
 def test_what_was_tuned_names_planner_constants_method_episodes_and_suites():
     text = what_was_tuned(job().model_dump(), findings(), evaluations())
-    assert text.startswith("3 constants of the extended planner on the robot disc were tuned: clearance, local_heading, "
-                           "progress. The method nsga3 tried 7 sets of constants in 300 episodes")  # fmt: skip
+    assert text.startswith("3 constants of the extended planner on the robot disc were tuned: clearance, "
+                           "local_heading, progress. The method nsga3 tried 7 sets of constants in 300 episodes")
     assert "Training: paper-20 (40 scenarios, seed 1); held out: paper-20 (40 scenarios, seed 2)." in text
 
 
