@@ -10,12 +10,12 @@ from pathlib import Path
 
 from tuning.findings import Findings
 from tuning.outputs import write_whole
-from tuning.report import NAME
+from tuning.report import JOB_FILE, NAME
 from tuning.report_figures import measure_name, recommended
 from tuning.report_summary import SUCCESS, shown, shown_difference, verdict
 
 JOB = """\
-# Written by `adwa demo`; change it and run it again with `adwa tune run demo.toml --out FOLDER`.
+# Written by `adwa demo`; change it and run it again with `adwa tune run FILE --out FOLDER`.
 name = "demo"
 seed = {seed}
 
@@ -54,13 +54,13 @@ rule = "knee"
 
 
 def run_demo(out: Path, seed: int = 0, quiet: bool = False) -> Findings:
-    """Write the job file into `out`, run the job there, and print what it found."""
-    from tuning.run_job import run_job  # builds on all of tuning
+    """Write the job file into `out`, run the job in a folder beside it, or go on with it, and print what it found."""
+    from tuning.run_job import resume_job, run_job  # builds on all of tuning
 
     out.mkdir(parents=True, exist_ok=True)
-    file, folder = out / "demo.toml", out / "job"
+    file, folder = out / f"demo_{seed}.toml", out / f"job_{seed}"
     write_whole(file, JOB.format(seed=seed, training=2 * seed + 1, held_out=2 * seed + 2))
-    findings = run_job(file, folder, quiet)
+    findings = resume_job(folder, quiet) if (folder / JOB_FILE).exists() else run_job(file, folder, quiet)
     if not quiet:
         print("\n".join(sentences(findings)))
         print(f"report: {folder / NAME}")

@@ -1,7 +1,7 @@
 """The report of a tuning job: one HTML file that needs nothing beside it and no network."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
 from string import Template
@@ -160,9 +160,16 @@ def _gradient_tables(parameters: Sequence[str], agreement: Mapping[str, np.ndarr
 
 
 def _provenance(folder: Path, fields: Mapping[str, Any], environment: Mapping[str, Any]) -> str:
-    rows = [("seed", str(fields.get("seed", "")))]
-    rows += [(name, value if isinstance(value, str) else json.dumps(value, default=str))
-             for name, value in environment.items()]  # fmt: skip
+    rows = [(name, str(value)) for name, value in _flat({"seed": fields.get("seed"), **environment})]
     file = folder / JOB_FILE
     text = file.read_text(encoding="utf-8") if file.is_file() else json.dumps(fields, indent=1, default=str)
     return "\n".join([html.table("Made with", ("what", "value"), rows), html.folded("Job file", html.listing(text))])
+
+
+def _flat(facts: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
+    """Facts in facts by a dotted name."""
+    for name, value in facts.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{above}{name}.")
+        else:
+            yield f"{above}{name}", value

@@ -20,7 +20,11 @@ def ran(monkeypatch):
         calls.append((job_path, folder, quiet))
         return findings()
 
-    monkeypatch.setitem(sys.modules, "tuning.run_job", SimpleNamespace(run_job=run_job))
+    def resume_job(folder, quiet):
+        calls.append(("resumed", folder, quiet))
+        return findings()
+
+    monkeypatch.setitem(sys.modules, "tuning.run_job", SimpleNamespace(run_job=run_job, resume_job=resume_job))
     return calls
 
 
@@ -32,7 +36,7 @@ def test_the_demo_runs_a_job_on_training_maps_that_are_not_held_out(tmp_path, ra
     assert training["suite"] == held_out["suite"] == "paper-20"
     assert training["seed"] != held_out["seed"]
     assert job["seed"] == 3
-    assert folder == tmp_path / "demo" / "job"
+    assert folder == tmp_path / "demo" / "job_3"
     assert quiet
 
 
@@ -53,7 +57,15 @@ def test_the_demo_ends_with_constants_success_before_and_after_and_the_report(tm
     assert "success on 40 training scenarios: 95.0 % [" in printed
     assert printed.count(" before, ") == printed.count(" after\n") == 2
     assert "better? In part:" in printed
-    assert printed.splitlines()[-1] == f"report: {tmp_path / 'job' / 'report.html'}"
+    assert printed.splitlines()[-1] == f"report: {tmp_path / 'job_0' / 'report.html'}"
+
+
+def test_a_demo_that_has_begun_goes_on(tmp_path, ran):
+    (tmp_path / "job_0").mkdir()
+    (tmp_path / "job_0" / "job.toml").touch()
+    run_demo(tmp_path, quiet=True)
+    run_demo(tmp_path, seed=1, quiet=True)
+    assert [call[0] for call in ran] == ["resumed", tmp_path / "demo_1.toml"]
 
 
 def test_a_quiet_demo_prints_nothing(tmp_path, ran, capsys):
