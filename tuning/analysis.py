@@ -5,6 +5,7 @@ Intervals of rates are Wilson's, those of other figures percentiles of the boots
 Dimension letters: W candidates; N members; H rows driven on held-out scenarios; O objectives; R resamples.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,21 +43,21 @@ def analyse(training: Evaluations, held_out: Evaluations | None, held_out_rows: 
     candidates = _candidates(training, goals)
     repeats, success = _resampled(candidates, goals, seed)
     shown = _shown(candidates, choice, goals)
-    judged = _Held(held_out, dict(zip(np.asarray(held_out_rows).tolist(), range(len(held_out_rows)), strict=True)))
-    likely = chances(repeats)
-    default, *front_members = (_member(candidates, index, likely, judged, goals, seed) for index in (0, *shown))
+    rows_there = [] if held_out is None else np.asarray(held_out_rows).tolist()
+    held_out_of = {row: index for index, row in enumerate(rows_there)}
+    default, *members = _members(candidates, [0, *shown], chances(repeats), held_out, held_out_of, goals, seed)
     choices = _choices(candidates, shown, repeats, success, choice, goals)
     recommended = RULES.index(choice.rule)
     return Findings(
         parameters=training.parameters,
         goals=goals,
         default=default,
-        front=tuple(front_members),
+        front=tuple(members),
         choices=choices,
         recommended=recommended,
         hypervolume=hypervolume_curve(training, goals),
         importance=importance(training, goals, space),
-        compared=_compared(judged, front_members, choices[recommended].member, goals, seed),
+        compared=_compared(held_out, held_out_of, members, choices[recommended].member, goals, seed),
     )
 
 
@@ -87,16 +88,17 @@ def optimism(member: Member, goals: Goals) -> tuple[float, ...] | None:
     return tuple(statistic.sign * (there.value - here.value) for statistic, here, there in pairs)
 
 
-def judgement(evaluations: Evaluations, row: int, goals: Goals, seed: int) -> Judgement:
-    """Figures of one row with their intervals, over the scenarios it has seen."""
-    one = evaluations.rows(np.array([row]))
-    drawn = draws(one.done.shape[1], RESAMPLES, seed)
-    return Judgement(
-        scenarios=int(one.done.sum()),
-        success=_interval(one, SUCCESS, drawn),
-        objectives=tuple(_interval(one, statistic, drawn) for statistic in goals.objectives),
-        feasible=bool(goals.scores(one.columns, one.done).violation[0] == 0),
-    )
+def judgements(evaluations: Evaluations, rows: Sequence[int], goals: Goals, seed: int) -> list[Judgement]:
+    """Figures of some rows with their intervals, each over the scenarios that it has seen."""
+    some = evaluations.rows(np.asarray(rows, np.intp))
+    drawn = draws(some.done.shape[1], RESAMPLES, seed)
+    success = _intervals(some, SUCCESS, drawn)
+    objectives = [_intervals(some, statistic, drawn) for statistic in goals.objectives]
+    feasible = goals.scores(some.columns, some.done).violation == 0
+    return [
+        Judgement(int(done.sum()), success[index], tuple(column[index] for column in objectives), bool(feasible[index]))
+        for index, done in enumerate(some.done)
+    ]
 
 
 @dataclass(frozen=True)
@@ -114,19 +116,6 @@ class _Candidates:
         objectives, violation = self.scores
         scenarios = self.evaluations.done.shape[1]
         return Standing(objectives[self.members], violation[self.members], self.success[self.members], scenarios)
-
-
-@dataclass(frozen=True)
-class _Held:
-    """Evaluations on held-out scenarios, and which of their rows belongs to a training row."""
-
-    evaluations: Evaluations | None
-    row_of: dict[int, int]
-
-    def judgement(self, row: int, goals: Goals, seed: int) -> Judgement | None:
-        if self.evaluations is None or row not in self.row_of:
-            return None
-        return judgement(self.evaluations, self.row_of[row], goals, seed)
 
 
 def _candidates(training: Evaluations, goals: Goals) -> _Candidates:
@@ -159,15 +148,16 @@ def _shown(candidates: _Candidates, choice: ChoiceSettings, goals: Goals) -> lis
     return [int(candidates.members[index]) for index in order if index in kept]
 
 
-def _member(candidates: _Candidates, index: int, likely: np.ndarray, held: _Held, goals: Goals, seed: int) -> Member:
-    row = int(candidates.rows[index])
-    return Member(
-        row=row,
-        values=candidates.evaluations.values[index],
-        training=judgement(candidates.evaluations, index, goals, seed),
-        held_out=held.judgement(row, goals, seed),
-        non_dominated=float(likely[index]),
-    )
+def _members(candidates: _Candidates, which: list[int], likely: np.ndarray, held_out: Evaluations | None,
+             held_out_of: dict[int, int], goals: Goals, seed: int) -> list[Member]:
+    """which: indices into the candidates; held_out_of: training row -> row of `held_out`."""
+    rows = [int(candidates.rows[index]) for index in which]
+    training = judgements(candidates.evaluations, which, goals, seed)
+    driven = [row for row in rows if row in held_out_of]
+    there = judgements(held_out, [held_out_of[row] for row in driven], goals, seed) if held_out is not None else []
+    judged = dict(zip(driven, there, strict=True))
+    return [Member(row, candidates.evaluations.values[index], here, judged.get(row), float(likely[index]))
+            for row, index, here in zip(rows, which, training, strict=True)]  # fmt: skip
 
 
 def _choices(candidates: _Candidates, shown: list[int], repeats: ResampledScores, success: np.ndarray,
@@ -186,17 +176,20 @@ def _choices(candidates: _Candidates, shown: list[int], repeats: ResampledScores
     )
 
 
-def _compared(held: _Held, members: list[Member], recommended: int, goals: Goals, seed: int) -> Comparison | None:
-    row = held.row_of.get(members[recommended].row)
-    if held.evaluations is None or row is None or 0 not in held.row_of:
+def _compared(held_out: Evaluations | None, held_out_of: dict[int, int], members: list[Member], recommended: int,
+              goals: Goals, seed: int) -> Comparison | None:
+    row, default = held_out_of.get(members[recommended].row), held_out_of.get(0)
+    if held_out is None or row is None or default is None:
         return None
-    front_there = [held.row_of.get(member.row) for member in members]
-    return compare(held.evaluations, row, held.row_of[0], front_there, goals, seed)
+    return compare(held_out, row, default, [held_out_of.get(member.row) for member in members], goals, seed)
 
 
-def _interval(one: Evaluations, statistic: Statistic, drawn: np.ndarray) -> Interval:
-    value = float(estimate(statistic, one.columns, one.done)[0])
-    if statistic.measure in RATES and statistic.worst_share == 1.0 and one.done.any():
-        count = int(one.done.sum())
-        return Interval(value, *wilson(round(value * count), count))
-    return percentile_interval(value, resampled(statistic, one.columns, one.done, drawn)[:, 0])
+def _intervals(evaluations: Evaluations, statistic: Statistic, drawn: np.ndarray) -> list[Interval]:
+    """Of each row."""
+    values = estimate(statistic, evaluations.columns, evaluations.done).tolist()
+    if statistic.measure in RATES and statistic.worst_share == 1.0:
+        counts = evaluations.done.sum(axis=1).tolist()
+        return [Interval(value, *wilson(round(value * count), count)) if count else Interval(value, value, value)
+                for value, count in zip(values, counts, strict=True)]  # fmt: skip
+    repeats = resampled(statistic, evaluations.columns, evaluations.done, drawn).T
+    return [percentile_interval(value, one) for value, one in zip(values, repeats, strict=True)]

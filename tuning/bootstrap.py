@@ -15,6 +15,7 @@ from tuning.findings import Interval
 from tuning.objectives import NOTHING, Goals, Statistic, sample
 
 RESAMPLES = 1000
+DIGITS = 9  # after the point: sums in another order must not tell equal candidates apart
 SUCCESS = Statistic("success", "max")
 
 
@@ -40,7 +41,8 @@ def resampled(statistic: Statistic, columns: Mapping[str, np.ndarray], counted: 
     values, kept = sample(statistic, columns, counted)
     count = drawn @ kept.T.astype(np.float64)
     if statistic.worst_share < 1.0:
-        worst = [_mean_of_worst(*candidate, statistic, drawn) for candidate in zip(values, kept, count.T, strict=True)]
+        times = np.ascontiguousarray(drawn.T)
+        worst = [_mean_of_worst(*candidate, statistic, times) for candidate in zip(values, kept, count.T, strict=True)]
         return np.stack(worst, axis=1)
     return _over(drawn @ np.where(kept, values, 0.0).T, count)
 
@@ -55,7 +57,7 @@ def resampled_scores(goals: Goals, columns: Mapping[str, np.ndarray], counted: n
         statistic, sign = constraint.statistic, constraint.statistic.sign
         value = _minimised(statistic, resampled(statistic, columns, counted, drawn))
         violation += np.maximum(value - sign * constraint.bound, 0.0)
-    return ResampledScores(objectives, violation)
+    return ResampledScores(objectives.round(DIGITS), violation.round(DIGITS))
 
 
 def percentile_interval(value: float, repeats: np.ndarray) -> Interval:
@@ -71,18 +73,17 @@ def percentile_interval(value: float, repeats: np.ndarray) -> Interval:
 
 
 def _mean_of_worst(values: np.ndarray, kept: np.ndarray, count: np.ndarray, statistic: Statistic,
-                   drawn: np.ndarray) -> np.ndarray:
-    """[R] of one candidate. values, kept: [S]; count: [R] scenarios drawn that count."""
+                   times: np.ndarray) -> np.ndarray:
+    """[R] of one candidate. values, kept: [S]; count: [R] scenarios drawn that count; times: [S, R], `draws` turned."""
     order = np.argsort(-statistic.sign * values, kind="stable")
     order = order[kept[order]]
     wanted = np.ceil(statistic.worst_share * count - 1e-9)
     likely = order[: int(1.25 * statistic.worst_share * order.size) + 64]  # the rest is hardly ever needed
-    if not np.all(drawn[:, likely].sum(axis=1) >= wanted):
-        likely = order
-    times = drawn[:, likely]
-    before = np.cumsum(times, axis=1) - times
-    taken = np.clip(wanted[:, None] - before, 0.0, times)
-    return _over(taken @ values[likely], wanted)
+    so_far = np.cumsum(times[likely], axis=0)
+    if likely.size < order.size and np.any(so_far[-1] < wanted):
+        likely, so_far = order, np.cumsum(times[order], axis=0)
+    taken = np.diff(np.minimum(so_far, wanted), axis=0, prepend=0.0)
+    return _over(values[likely] @ taken, wanted)
 
 
 def _over(total: np.ndarray, count: np.ndarray) -> np.ndarray:

@@ -46,7 +46,7 @@ class Choice:
 
     rule: str  # of choice.RULES
     member: int  # index into the front
-    stability: float  # share of the resamples in which the same member is picked
+    stability: float  # share of the resamples in which the same of the front's members is picked; low among near-equals
     reason: str  # one sentence for people
 
 

@@ -75,6 +75,15 @@ def test_candidates_stay_paired():
     assert repeats[:, 0].std() > 0.01
 
 
+def test_candidates_that_did_the_same_have_the_same_scores():
+    """Products of matrices add up in another order from column to column."""
+    times = np.tile(np.random.default_rng(0).random(1024), (37, 1))
+    judged = evaluations(np.ones((37, 1024)), np.ones(37), time=times)
+    goals = Goals((Statistic("time", "min"), Statistic("time", "min", 0.2)))
+    found = resampled_scores(goals, judged.columns, judged.done, draws(1024, 33, seed=0)).objectives
+    np.testing.assert_array_equal(found, np.broadcast_to(found[:, :1], found.shape))
+
+
 def test_the_interval_of_a_mean_is_about_that_of_the_normal_law():
     values = np.random.default_rng(1).normal(size=400)
     judged = evaluations(np.ones((1, 400)), values[None, :])

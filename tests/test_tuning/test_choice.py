@@ -60,6 +60,7 @@ def test_one_standard_error_by_hand():
     """Of 0.99 in 100: p = 100 / 102, error √(p(1 − p) / 100) = 0.01386: 0.98 is within it, 0.96 is not."""
     assert standard_error(0.99, 100) == pytest.approx(0.013865, abs=1e-6)
     assert one_standard_error(standing(), 1) == 1
+    assert one_standard_error(standing(scenarios=50), 1) == 1  # p = 50.5 / 52, error 0.0237: 0.96 lies just beyond
     assert one_standard_error(standing(scenarios=10), 1) == 2  # p = 10.9 / 12, error 0.0914
     assert one_standard_error(standing(scenarios=10_000), 1) == 0
 
@@ -140,7 +141,7 @@ def test_a_reason_says_that_no_candidate_is_feasible():
 @pytest.mark.parametrize(("given", "place", "words"), [
     ({"rule": "best"}, "rule", "knee"),
     ({"at_least": 1.2}, "at_least", "less than or equal to 1"),
-    ({"at_least": float("nan")}, "at_least", "greater than or equal to 0"),
+    ({"at_least": float("nan")}, "at_least", "less than or equal to 1"),
     ({"at_least": "0.9"}, "at_least", "number"),
     ({"weights": {"success": -1.0}}, "weights", "greater than or equal to 0"),
     ({"weights": {"success": float("inf")}}, "weights", "finite"),
