@@ -44,7 +44,7 @@ at_least = 0.97
 
 [method]
 name = "nsga3"
-episodes = 6144
+episodes = 4608
 racing = true
 population = 16
 
