@@ -1,0 +1,74 @@
+"""NSGA-III (Deb and Jain 2014), an evolutionary search for a whole front, by pymoo."""
+
+import warnings
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+from pymoo.algorithms.moo.nsga3 import NSGA3
+from pymoo.core.evaluator import Evaluator
+from pymoo.core.problem import Problem as Bounds
+from pymoo.core.termination import NoTermination
+from pymoo.operators.crossover.sbx import SBX
+from pymoo.operators.mutation.pm import PM
+from pymoo.problems.static import StaticProblem
+from pymoo.util.ref_dirs import get_reference_directions
+
+from tuning.methods.method import Problem, Search
+from tuning.methods.sobol import sobol_points
+from tuning.objectives import Scores
+
+
+class Settings(BaseModel):
+    """Of this method."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    population: int | None = Field(None, ge=4, le=1024)
+    """Candidates a generation, and reference directions; by default an eighth of the budget, from 16 to 128."""
+
+    crossover_eta: float = Field(15.0, gt=0.0, le=100.0)
+    """Index of the simulated binary crossover; the larger, the nearer children are to their parents."""
+
+    mutation_eta: float = Field(10.0, gt=0.0, le=100.0)
+    """Index of the polynomial mutation, alike."""
+
+
+def nsga3(problem: Problem) -> Search:
+    """A first generation of the default constants and Sobol points, then each the offspring of all before it.
+
+    What violates a constraint loses to what violates it less, and that to what violates none.
+    """
+    settings = Settings.model_validate(problem.settings)
+    population = min(settings.population or min(max(problem.candidates // 8, 16), 128), problem.candidates)
+    algorithm = _algorithm(problem, population, settings)
+    left = problem.candidates
+    while left > 0 and (asked := algorithm.ask()) is not None:
+        scores = yield asked.get("X")[:left]
+        left -= len(asked)
+        if left > 0:
+            _tell(algorithm, asked, scores)
+
+
+def _algorithm(problem: Problem, population: int, settings: Settings) -> NSGA3:
+    dimensions, objectives = len(problem.space.parameters), len(problem.goals.objectives)
+    algorithm = NSGA3(
+        get_reference_directions("energy", objectives, population, seed=1),
+        pop_size=population,
+        sampling=_first(problem, population),
+        crossover=SBX(eta=settings.crossover_eta, prob=1.0),
+        mutation=PM(eta=settings.mutation_eta),
+    )
+    bounds = Bounds(n_var=dimensions, n_obj=objectives, n_ieq_constr=1, xl=0.0, xu=1.0)
+    return algorithm.setup(bounds, termination=NoTermination(), seed=problem.seed)
+
+
+def _first(problem: Problem, population: int) -> np.ndarray:
+    default = problem.space.unit(problem.space.default[None])
+    return np.concatenate([default, sobol_points(default.shape[1], population - 1, problem.seed)])
+
+
+def _tell(algorithm: NSGA3, asked, scores: Scores) -> None:
+    judged = StaticProblem(algorithm.problem, F=scores.objectives, G=scores.violation[:, None])
+    Evaluator().eval(judged, asked)
+    with warnings.catch_warnings():  # pymoo silences all of them, for good
+        algorithm.tell(infills=asked)
