@@ -93,7 +93,7 @@ class _Search:
 
     def ask(self) -> np.ndarray:
         """[C, D]"""
-        self._asked = self._strategy.ask()
+        self._asked = list(self._strategy.ask() or ())
         return np.array(self._asked)
 
     def tell(self, scores: Scores) -> None:

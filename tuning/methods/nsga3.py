@@ -5,7 +5,9 @@ import warnings
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 from pymoo.algorithms.moo.nsga3 import NSGA3
+from pymoo.core.algorithm import Algorithm
 from pymoo.core.evaluator import Evaluator
+from pymoo.core.population import Population
 from pymoo.core.problem import Problem as Bounds
 from pymoo.core.termination import NoTermination
 from pymoo.operators.crossover.sbx import SBX
@@ -26,10 +28,10 @@ class Settings(BaseModel):
     population: int | None = Field(None, ge=4, le=1024)
     """Candidates a generation, and reference directions; by default an eighth of the budget, from 16 to 128."""
 
-    crossover_eta: float = Field(15.0, gt=0.0, le=100.0)
+    crossover_eta: int = Field(15, ge=1, le=100)
     """Index of the simulated binary crossover; the larger, the nearer children are to their parents."""
 
-    mutation_eta: float = Field(10.0, gt=0.0, le=100.0)
+    mutation_eta: int = Field(10, ge=1, le=100)
     """Index of the polynomial mutation, alike."""
 
 
@@ -43,18 +45,18 @@ def nsga3(problem: Problem) -> Search:
     algorithm = _algorithm(problem, population, settings)
     left = problem.candidates
     while left > 0 and (asked := algorithm.ask()) is not None:
-        scores = yield asked.get("X")[:left]
+        scores = yield np.array(asked.get("X"))[:left]
         left -= len(asked)
         if left > 0:
             _tell(algorithm, asked, scores)
 
 
-def _algorithm(problem: Problem, population: int, settings: Settings) -> NSGA3:
+def _algorithm(problem: Problem, population: int, settings: Settings) -> Algorithm:
     dimensions, objectives = len(problem.space.parameters), len(problem.goals.objectives)
     algorithm = NSGA3(
         get_reference_directions("energy", objectives, population, seed=1),
         pop_size=population,
-        sampling=_first(problem, population),
+        sampling=_first(problem, population),  # pyright: ignore[reportArgumentType]
         crossover=SBX(eta=settings.crossover_eta, prob=1.0),
         mutation=PM(eta=settings.mutation_eta),
     )
@@ -67,7 +69,7 @@ def _first(problem: Problem, population: int) -> np.ndarray:
     return np.concatenate([default, sobol_points(default.shape[1], population - 1, problem.seed)])
 
 
-def _tell(algorithm: NSGA3, asked, scores: Scores) -> None:
+def _tell(algorithm: Algorithm, asked: Population, scores: Scores) -> None:
     judged = StaticProblem(algorithm.problem, F=scores.objectives, G=scores.violation[:, None])
     Evaluator().eval(judged, asked)
     with warnings.catch_warnings():  # pymoo silences all of them, for good

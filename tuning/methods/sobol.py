@@ -33,5 +33,5 @@ def sobol(problem: Problem) -> Search:
 
 def sobol_points(dimensions: int, count: int, seed: int) -> np.ndarray:
     """[count, dimensions] float64 in the unit cube; a longer sequence begins with the shorter one."""
-    sequence = qmc.Sobol(dimensions, scramble=True, seed=np.random.default_rng(seed))
+    sequence = qmc.Sobol(dimensions, scramble=True, rng=np.random.default_rng(seed))
     return sequence.random_base2(max(count - 1, 0).bit_length())[:count]
