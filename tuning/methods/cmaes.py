@@ -8,9 +8,9 @@ import numpy as np
 from cma import CMAEvolutionStrategy
 from moocore import is_nondominated
 from pydantic import BaseModel, ConfigDict, Field
-from pymoo.util.ref_dirs import get_reference_directions
 
 from tuning.methods.method import Problem, Search
+from tuning.methods.sobol import sobol_points
 from tuning.objectives import Scores
 
 AUGMENTED = 0.05  # share of the sum beside the maximum: breaks ties towards proper Pareto optima
@@ -88,23 +88,25 @@ class _Search:
 
     def __init__(self, weights: np.ndarray, start: np.ndarray, settings: Settings, random: np.random.Generator):
         self._weights, self._settings, self._random = weights, settings, random
+        self._dimensions = start.size
         self._strategy = self._begun(start)
         self._asked: list[np.ndarray] = []
 
     def ask(self) -> np.ndarray:
         """[C, D]"""
         self._asked = list(self._strategy.ask() or ())
-        return np.array(self._asked)
+        return np.array(self._asked)[:, : self._dimensions]
 
     def tell(self, scores: Scores) -> None:
         """Of what was asked last."""
         self._strategy.tell(self._asked, ranks(scores, self._weights).tolist())
-        if any(reason in CONVERGED for reason in self._strategy.stop()):
-            self._strategy = self._begun(self._random.uniform(size=self._asked[0].size))
+        if any(reason in CONVERGED for reason in self._strategy.stop() or ()):
+            self._strategy = self._begun(self._random.uniform(size=self._dimensions))
 
     def _begun(self, start: np.ndarray) -> CMAEvolutionStrategy:
         options = {"bounds": [0.0, 1.0], "popsize": self._settings.population, "verbose": -9,
                    "seed": np.nan, "randn": self._normals}  # its own stream, not numpy's global one  # fmt: skip
+        start = np.append(start, 0.5) if start.size == 1 else start  # two at least; the second is then without effect
         return CMAEvolutionStrategy(np.clip(start, INSIDE, 1.0 - INSIDE), self._settings.step, options)
 
     def _normals(self, *shape: int) -> np.ndarray:
@@ -120,8 +122,10 @@ def _searches(problem: Problem, settings: Settings) -> list[_Search]:
 
 
 def _weights(objectives: int, count: int) -> np.ndarray:
-    """[count, objectives] each summing to 1, spread evenly (Blank, Deb et al. 2021)."""
-    if objectives == 1 or count == 1:
-        return np.full((count, objectives), 1.0 / objectives)
-    spread = get_reference_directions("energy", objectives, count, seed=1)
-    return (1.0 - LEAST_WEIGHT) * spread + LEAST_WEIGHT / objectives
+    """[count, objectives] that each sum to 1, none of them 0: quasi-random and uniform over all such weights, as the
+    gaps between 0, the sorted coordinates of a Sobol point, and 1.
+    """
+    if objectives == 1:
+        return np.ones((count, 1))
+    cuts = np.sort(sobol_points(objectives - 1, count, seed=0), axis=1)
+    return (1.0 - LEAST_WEIGHT) * np.diff(cuts, axis=1, prepend=0.0, append=1.0) + LEAST_WEIGHT / objectives

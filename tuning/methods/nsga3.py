@@ -1,6 +1,7 @@
 """NSGA-III (Deb and Jain 2014), an evolutionary search for a whole front, by pymoo."""
 
 import warnings
+from math import comb
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
@@ -26,7 +27,7 @@ class Settings(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
     population: int | None = Field(None, ge=4, le=1024)
-    """Candidates a generation, and reference directions; by default an eighth of the budget, from 16 to 128."""
+    """Candidates a generation, no fewer than objectives; by default a 64th of the budget, from 16 to 128."""
 
     crossover_eta: int = Field(15, ge=1, le=100)
     """Index of the simulated binary crossover; the larger, the nearer children are to their parents."""
@@ -41,8 +42,8 @@ def nsga3(problem: Problem) -> Search:
     What violates a constraint loses to what violates it less, and that to what violates none.
     """
     settings = Settings.model_validate(problem.settings)
-    population = min(settings.population or min(max(problem.candidates // 8, 16), 128), problem.candidates)
-    algorithm = _algorithm(problem, population, settings)
+    population = settings.population or min(max(problem.candidates // 64, 16), 128)
+    algorithm = _algorithm(problem, max(population, len(problem.goals.objectives)), settings)
     left = problem.candidates
     while left > 0 and (asked := algorithm.ask()) is not None:
         scores = yield np.array(asked.get("X"))[:left]
@@ -54,7 +55,7 @@ def nsga3(problem: Problem) -> Search:
 def _algorithm(problem: Problem, population: int, settings: Settings) -> Algorithm:
     dimensions, objectives = len(problem.space.parameters), len(problem.goals.objectives)
     algorithm = NSGA3(
-        get_reference_directions("energy", objectives, population, seed=1),
+        _directions(objectives, population),
         pop_size=population,
         sampling=_first(problem, population),  # pyright: ignore[reportArgumentType]
         crossover=SBX(eta=settings.crossover_eta, prob=1.0),
@@ -67,6 +68,12 @@ def _algorithm(problem: Problem, population: int, settings: Settings) -> Algorit
 def _first(problem: Problem, population: int) -> np.ndarray:
     default = problem.space.unit(problem.space.default[None])
     return np.concatenate([default, sobol_points(default.shape[1], population - 1, problem.seed)])
+
+
+def _directions(objectives: int, most: int) -> np.ndarray:
+    """[at most `most`, objectives] evenly spread weights (Das and Dennis 1998), at least one an objective."""
+    finest = max(parts for parts in range(1, most + 1) if comb(parts + objectives - 1, parts) <= most)
+    return get_reference_directions("das-dennis", objectives, n_partitions=finest)
 
 
 def _tell(algorithm: Algorithm, asked: Population, scores: Scores) -> None:
