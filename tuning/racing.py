@@ -12,7 +12,7 @@ from scipy import stats
 
 from tuning.objectives import Constraint, Goals, Statistic, estimate, sample
 
-ERROR = 0.01  # probability of calling a difference clear that is none, over all rivals of a candidate together
+ERROR = 0.01  # probability of calling a candidate clearly worse, at one look, where no rival is better
 FEWEST = 8  # values of a measure, below which no difference in it is clear
 
 Columns = dict[str, np.ndarray]
