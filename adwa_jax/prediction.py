@@ -39,12 +39,24 @@ class Prediction(NamedTuple):
     contact_time: jax.Array  # until that clearance falls below 0; the whole watch if it never does [s]
 
 
+class Leg(NamedTuple):
+    """[V, N] float32: where candidates are after some of their steps, and what they met until then."""
+
+    x: jax.Array  # [m]
+    y: jax.Array  # [m]
+    static: jax.Array  # least clearance to statics, from the robot's outline [m]
+    moving: jax.Array  # least clearance to predicted movers, less their margin [m]
+    contact_time: jax.Array  # until that clearance falls below 0; of the last of all steps if it does not [s]
+
+
 class _Carry(NamedTuple):
-    x: jax.Array
-    y: jax.Array
-    static: jax.Array
-    moving: jax.Array
-    contact_time: jax.Array
+    """Candidates in one row of C = V·N, which the costly loops take in whole vectors."""
+
+    x: jax.Array  # [C]
+    y: jax.Array  # [C]
+    next_x: jax.Array  # [V, N] after the next step, if nothing is in the way
+    next_y: jax.Array  # [V, N]
+    static: jax.Array  # [C]
 
 
 def candidate_clearance(state: RobotState, v: jax.Array, arc: Arcs, field: DistanceField, sensed: Sensed,
@@ -161,36 +173,57 @@ def predict(state: RobotState, profiles: Profiles, horizon: int, stride: int, fi
     With `room`, [] [m], a candidate stays where it would come nearer than that to a static obstacle; else it drives on
     through it. With `growing_margin` movers are `mover_margin` + `mover_growth` · time larger.
     """
-    ahead = points(state.heading, profiles.yaw_rate_ahead, behaviour.dt, stride)
-    step = behaviour.dt * stride
+    steps, half = profiles.v_ahead.shape[0], max(horizon // 2, 1)
+    middle, end, last = follow(state, profiles, stride, (half, horizon, steps), field, sensed, robot, behaviour,
+                               growing_margin, room)
+    headings = state.heading + jnp.cumsum(profiles.yaw_rate_ahead[:horizon] * (behaviour.dt * stride), axis=0)
+    return Prediction(headings, (middle.x, middle.y), Pose(end.x, end.y, headings[-1][None, :]), end.static,
+                      last.moving, last.contact_time)
 
-    def body_fun(carry: _Carry, row: tuple[Points, jax.Array, jax.Array]) -> tuple[_Carry, tuple]:
-        at, v, count = row
-        x, y = carry.x + v[:, None] * at.move_x[None, :], carry.y + v[:, None] * at.move_y[None, :]
-        here = static_clearance(field, sensed, robot, x, y, at.cosine[None, :], at.sine[None, :])
-        static = jnp.minimum(carry.static, here)
+
+def follow(state: RobotState, profiles: Profiles, stride: int, ends: tuple[int, ...], field: DistanceField,
+           sensed: Sensed, robot: RobotLimits, behaviour: Behaviour, growing_margin: bool,
+           room: jax.Array | None) -> list[Leg]:
+    """The candidates after each of so many steps, `ends`, rising. The rest as for `predict`."""
+    ahead = points(state.heading, profiles.yaw_rate_ahead, behaviour.dt, stride)
+    steps, (v_count, n_count) = profiles.v_ahead.shape[0], _shape_of(profiles)
+    times = jnp.arange(1, steps + 1, dtype=jnp.float32) * (behaviour.dt * stride)
+
+    def moved(x: jax.Array, y: jax.Array, at: Points, v: jax.Array) -> tuple[jax.Array, jax.Array]:
+        return (x.reshape(v_count, n_count) + v[:, None] * at.move_x[None, :],
+                y.reshape(v_count, n_count) + v[:, None] * at.move_y[None, :])
+
+    def body_fun(carry: _Carry, row: tuple[Points, Points, jax.Array, jax.Array]) -> tuple[_Carry, jax.Array]:
+        at, next_at, next_v, time = row
+        cosine, sine = (jnp.tile(part, v_count) for part in (at.cosine, at.sine))
+        # Written down as part of the carry: worked out where it is looked up, it would cost as much as the look-up.
+        x, y = carry.next_x.reshape(-1), carry.next_y.reshape(-1)
+        static = lesser(static_clearance(field, sensed, robot, x, y, cosine, sine), carry.static)
         if room is not None:
             free = static > room
             x, y = jnp.where(free, x, carry.x), jnp.where(free, y, carry.y)
-        time = count * step
         margin = behaviour.mover_margin + behaviour.mover_growth * time if growing_margin else 0.0
-        moving = mover_clearance(sensed, robot, x, y, at.cosine[None, :], at.sine[None, :], time) - margin
-        touched = (moving < 0) & (carry.moving >= 0)
-        carry = _Carry(x, y, static, jnp.minimum(carry.moving, moving), jnp.where(touched, time, carry.contact_time))
-        return carry, (x, y, static)
+        moving = mover_clearance(sensed, robot, x, y, cosine, sine, time) - margin
+        return _Carry(x, y, *moved(x, y, next_at, next_v), static), moving
 
-    steps, v_count = profiles.v_ahead.shape
-    shape = (v_count, profiles.yaw_rate_ahead.shape[1])
-    rows = (ahead, profiles.v_ahead, jnp.arange(1, steps + 1, dtype=jnp.float32))
-    whole = jnp.float32(steps) * step
-    begin = _Carry(jnp.broadcast_to(state.x, shape), jnp.broadcast_to(state.y, shape),
-                   jnp.full(shape, NOWHERE, jnp.float32), jnp.full(shape, NOWHERE, jnp.float32),
-                   jnp.broadcast_to(whole, shape))  # fmt: skip
-    last, (x, y, static) = lax.scan(body_fun, begin, rows)
-    headings = state.heading + jnp.cumsum(profiles.yaw_rate_ahead[:horizon] * step, axis=0)
-    end = Pose(x[horizon - 1], y[horizon - 1], headings[-1][None, :])
-    half = max(horizon // 2, 1) - 1
-    return Prediction(headings, (x[half], y[half]), end, static[horizon - 1], last.moving, last.contact_time)
+    next_rows = jax.tree.map(lambda rows: jnp.concatenate([rows[1:], rows[-1:]]), (ahead, profiles.v_ahead))
+    rows = (ahead, *next_rows, times)
+    here = [jnp.broadcast_to(value, v_count * n_count) for value in (state.x, state.y, NOWHERE, NOWHERE, times[-1])]
+    x, y, static, moving, contact_time = here
+    carry = _Carry(x, y, *moved(x, y, jax.tree.map(lambda rows: rows[0], ahead), profiles.v_ahead[0]), static)
+    legs = []
+    for first, last in zip((0, *ends), ends, strict=False):
+        carry, clearances = lax.scan(body_fun, carry, jax.tree.map(lambda rows: rows[first:last], rows))
+        for time, clearance in zip(times[first:last], clearances, strict=True):
+            moving = lesser(clearance, moving)
+            contact_time = jnp.where(clearance < 0, lesser(time, contact_time), contact_time)
+        legs.append(Leg(*(value.reshape(v_count, n_count)
+                          for value in (carry.x, carry.y, carry.static, moving, contact_time))))
+    return legs
+
+
+def _shape_of(profiles: Profiles) -> tuple[int, int]:
+    return profiles.v_ahead.shape[1], profiles.yaw_rate_ahead.shape[1]
 
 
 def static_clearance(field: DistanceField, sensed: Sensed, robot: RobotLimits, x: jax.Array, y: jax.Array,
