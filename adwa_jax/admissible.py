@@ -4,13 +4,12 @@ from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 
 from adwa_jax.constants import Behaviour
 from adwa_jax.grid import DistanceField
 from adwa_jax.obstacles import NOWHERE, Sensed
 from adwa_jax.prediction import follow
-from adwa_jax.profiles import Profiles, halting_profiles
+from adwa_jax.profiles import Begins, Profiles, halting_profiles
 from adwa_jax.rollout import RobotState
 from adwa_jax.window import RobotLimits
 
@@ -35,13 +34,16 @@ def is_admissible(clearance: jax.Array, v: jax.Array, yaw_rate: jax.Array, robot
 
 
 def halts_clear(state: RobotState, profiles: Profiles, field: DistanceField, sensed: Sensed, robot: RobotLimits,
-                behaviour: Behaviour, steps: int, growing_margin: bool, room: jax.Array) -> Halt:
+                behaviour: Behaviour, steps: int, growing_margin: bool, room: jax.Array,
+                begins: Begins) -> Halt:
     """Whether the robot can still stop clear of everything after one step of each command (`rules.stopping`).
 
     The braking trajectory keeps more than `room`, [] [m], from statics. What is admissible leaves an admissible command
     for the next step: to go on braking. `steps` control steps are followed.
     """
-    halting = halting_profiles(profiles.v[:7], profiles.yaw_rate[:9], robot, behaviour.dt, steps)
-    (leg,) = follow(state, halting, 1, (steps,), field, sensed, robot, behaviour, growing_margin, None)
-    static, moving = (value.at[np.ix_((0,1,2,3,4,5,6,5,0),(0,1,2,3,4,5,6,7,8,0,1,2,3,5,6,7,8,0,1,2,3,5,6,7,8))].get(mode="promise_in_bounds") for value in (leg.static, leg.moving))
+    distinct = profiles.v[: begins.v[0][1]], profiles.yaw_rate[: begins.yaw_rate[0][1]]
+    halting = halting_profiles(*distinct, robot, behaviour.dt, steps)
+    (leg,), met = follow(state, halting, 1, (steps,), field, sensed, robot, behaviour, growing_margin,
+                         jnp.float32(-jnp.inf))
+    static, moving = begins.each(leg.static), begins.each(met.moving)
     return Halt(static > room, static, moving)

@@ -40,13 +40,18 @@ class Prediction(NamedTuple):
 
 
 class Leg(NamedTuple):
-    """[V, N] float32: where candidates are after some of their steps, and what they met until then."""
+    """Candidates after some of their steps; [V, N] float32."""
 
     x: jax.Array  # [m]
     y: jax.Array  # [m]
-    static: jax.Array  # least clearance to statics, from the robot's outline [m]
-    moving: jax.Array  # least clearance to predicted movers, less their margin [m]
-    contact_time: jax.Array  # until that clearance falls below 0; of the last of all steps if it does not [s]
+    static: jax.Array  # least clearance to statics until then, from the robot's outline [m]
+
+
+class Met(NamedTuple):
+    """[V, N] float32: as in `Prediction`."""
+
+    moving: jax.Array
+    contact_time: jax.Array
 
 
 class _Carry(NamedTuple):
@@ -174,56 +179,58 @@ def predict(state: RobotState, profiles: Profiles, horizon: int, stride: int, fi
     through it. With `growing_margin` movers are `mover_margin` + `mover_growth` · time larger.
     """
     steps, half = profiles.v_ahead.shape[0], max(horizon // 2, 1)
-    middle, end, last = follow(state, profiles, stride, (half, horizon, steps), field, sensed, robot, behaviour,
-                               growing_margin, room)
+    legs, met = follow(state, profiles, stride, (half, horizon, steps), field, sensed, robot, behaviour, growing_margin,
+                       jnp.float32(-jnp.inf) if room is None else room)
+    middle, end, _ = legs
     headings = state.heading + jnp.cumsum(profiles.yaw_rate_ahead[:horizon] * (behaviour.dt * stride), axis=0)
     return Prediction(headings, (middle.x, middle.y), Pose(end.x, end.y, headings[-1][None, :]), end.static,
-                      last.moving, last.contact_time)
+                      met.moving, met.contact_time)
 
 
 def follow(state: RobotState, profiles: Profiles, stride: int, ends: tuple[int, ...], field: DistanceField,
            sensed: Sensed, robot: RobotLimits, behaviour: Behaviour, growing_margin: bool,
-           room: jax.Array | None) -> list[Leg]:
-    """The candidates after each of so many steps, `ends`, rising. The rest as for `predict`."""
-    ahead = points(state.heading, profiles.yaw_rate_ahead, behaviour.dt, stride)
-    steps, (v_count, n_count) = profiles.v_ahead.shape[0], _shape_of(profiles)
-    times = jnp.arange(1, steps + 1, dtype=jnp.float32) * (behaviour.dt * stride)
+           room: jax.Array) -> tuple[list[Leg], Met]:
+    """The candidates after so many steps as each of `ends` says, the last of them all; and the movers they meet.
+
+    The rest as for `predict`.
+    """
+    shape = profiles.v_ahead.shape[1], profiles.yaw_rate_ahead.shape[1]
+    times = jnp.arange(1, ends[-1] + 1, dtype=jnp.float32) * (behaviour.dt * stride)
+    ahead = points(state.heading, profiles.yaw_rate_ahead, behaviour.dt, stride), profiles.v_ahead
 
     def moved(x: jax.Array, y: jax.Array, at: Points, v: jax.Array) -> tuple[jax.Array, jax.Array]:
-        return (x.reshape(v_count, n_count) + v[:, None] * at.move_x[None, :],
-                y.reshape(v_count, n_count) + v[:, None] * at.move_y[None, :])
+        return (x.reshape(shape) + v[:, None] * at.move_x[None, :], y.reshape(shape) + v[:, None] * at.move_y[None, :])
 
-    def body_fun(carry: _Carry, row: tuple[Points, Points, jax.Array, jax.Array]) -> tuple[_Carry, jax.Array]:
-        at, next_at, next_v, time = row
-        cosine, sine = (jnp.tile(part, v_count) for part in (at.cosine, at.sine))
-        # Written down as part of the carry: worked out where it is looked up, it would cost as much as the look-up.
+    def body_fun(carry: _Carry, row: tuple[tuple, tuple, jax.Array]) -> tuple[_Carry, jax.Array]:
+        (at, _), following, time = row
+        cosine, sine = (jnp.tile(part, shape[0]) for part in (at.cosine, at.sine))
+        # Worked out where it is looked up, instead of carried, the next point would cost as much as the look-up.
         x, y = carry.next_x.reshape(-1), carry.next_y.reshape(-1)
         static = lesser(static_clearance(field, sensed, robot, x, y, cosine, sine), carry.static)
-        if room is not None:
-            free = static > room
-            x, y = jnp.where(free, x, carry.x), jnp.where(free, y, carry.y)
+        free = static > room
+        x, y = jnp.where(free, x, carry.x), jnp.where(free, y, carry.y)
         margin = behaviour.mover_margin + behaviour.mover_growth * time if growing_margin else 0.0
         moving = mover_clearance(sensed, robot, x, y, cosine, sine, time) - margin
-        return _Carry(x, y, *moved(x, y, next_at, next_v), static), moving
+        return _Carry(x, y, *moved(x, y, *following), static), moving
 
-    next_rows = jax.tree.map(lambda rows: jnp.concatenate([rows[1:], rows[-1:]]), (ahead, profiles.v_ahead))
-    rows = (ahead, *next_rows, times)
-    here = [jnp.broadcast_to(value, v_count * n_count) for value in (state.x, state.y, NOWHERE, NOWHERE, times[-1])]
-    x, y, static, moving, contact_time = here
-    carry = _Carry(x, y, *moved(x, y, jax.tree.map(lambda rows: rows[0], ahead), profiles.v_ahead[0]), static)
-    legs = []
+    x, y, static = (jnp.broadcast_to(value, shape[0] * shape[1]) for value in (state.x, state.y, jnp.float32(NOWHERE)))
+    carry = _Carry(x, y, *moved(x, y, *jax.tree.map(lambda rows: rows[0], ahead)), static)
+    rows = ahead, jax.tree.map(lambda rows: jnp.concatenate([rows[1:], rows[-1:]]), ahead), times
+    legs, clearances = [], []
     for first, last in zip((0, *ends), ends, strict=False):
-        carry, clearances = lax.scan(body_fun, carry, jax.tree.map(lambda rows: rows[first:last], rows))
-        for time, clearance in zip(times[first:last], clearances, strict=True):
-            moving = lesser(clearance, moving)
-            contact_time = jnp.where(clearance < 0, lesser(time, contact_time), contact_time)
-        legs.append(Leg(*(value.reshape(v_count, n_count)
-                          for value in (carry.x, carry.y, carry.static, moving, contact_time))))
-    return legs
+        carry, moving = lax.scan(body_fun, carry, jax.tree.map(lambda rows: rows[first:last], rows))
+        legs.append(Leg(*(value.reshape(shape) for value in (carry.x, carry.y, carry.static))))
+        clearances += list(moving)
+    return legs, _met(clearances, times, shape)
 
 
-def _shape_of(profiles: Profiles) -> tuple[int, int]:
-    return profiles.v_ahead.shape[1], profiles.yaw_rate_ahead.shape[1]
+def _met(clearances: list[jax.Array], times: jax.Array, shape: tuple[int, int]) -> Met:
+    """Of the clearances [C] after each step."""
+    least, contact_time = clearances[-1], times[-1]
+    for clearance, time in zip(clearances[::-1], times[::-1], strict=True):
+        least = lesser(clearance, least)
+        contact_time = jnp.where(clearance < 0, time, contact_time)
+    return Met(least.reshape(shape), contact_time.reshape(shape))
 
 
 def static_clearance(field: DistanceField, sensed: Sensed, robot: RobotLimits, x: jax.Array, y: jax.Array,

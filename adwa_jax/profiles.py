@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
+from jax import lax
 
 from adwa_jax.grid import Scalar
 from adwa_jax.window import RobotLimits
@@ -27,6 +28,21 @@ class Targets(NamedTuple):
 
     first: jax.Array  # [A] float32
     second: jax.Array  # [A] float32
+
+
+class Begins(NamedTuple):
+    """Which candidates begin with the same command: the first speeds and yaw rates are distinct, and the runs (begin,
+    end) of these, one after another, are those of all candidates.
+    """
+
+    v: tuple[tuple[int, int], ...]
+    yaw_rate: tuple[tuple[int, int], ...]
+
+    def each(self, values: jax.Array) -> jax.Array:
+        """[V, N] values of all candidates from those of the distinct commands."""
+        for axis, runs in enumerate(self):
+            values = jnp.concatenate([lax.slice_in_dim(values, *run, axis=axis) for run in runs], axis=axis)
+        return values
 
 
 def window_profiles(v: jax.Array, yaw_rate: jax.Array, steps: int, turn_step: int, second_phase: bool) -> Profiles:
@@ -83,6 +99,13 @@ def turn_targets(held: jax.Array, second_phase: bool) -> Targets:
     turning = jnp.concatenate([held[:half], held[half + 1 :]])
     return Targets(jnp.concatenate([held, turning, turning]),
                    jnp.concatenate([held, jnp.zeros_like(turning), -turning]))
+
+
+def begins_of(v: tuple[tuple[int, int], ...], yaw_rates: int, second_phase: bool) -> Begins:
+    """Of the candidates of `turn_targets` of so many yaw rates."""
+    half = yaw_rates // 2
+    turning = ((0, half), (half + 1, yaw_rates)) * 2 if second_phase else ()
+    return Begins(v, ((0, yaw_rates), *turning))
 
 
 def halting_profiles(v: jax.Array, yaw_rate: jax.Array, robot: RobotLimits, dt: Scalar, steps: int) -> Profiles:
