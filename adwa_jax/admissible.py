@@ -7,7 +7,7 @@ import jax.numpy as jnp
 
 from adwa_jax.constants import Behaviour
 from adwa_jax.grid import DistanceField
-from adwa_jax.obstacles import NOWHERE, Sensed
+from adwa_jax.obstacles import Sensed
 from adwa_jax.prediction import follow
 from adwa_jax.profiles import Begins, Profiles, halting_profiles
 from adwa_jax.rollout import RobotState
@@ -35,15 +35,17 @@ def is_admissible(clearance: jax.Array, v: jax.Array, yaw_rate: jax.Array, robot
 
 def halts_clear(state: RobotState, profiles: Profiles, field: DistanceField, sensed: Sensed, robot: RobotLimits,
                 behaviour: Behaviour, steps: int, growing_margin: bool, room: jax.Array,
-                begins: Begins) -> Halt:
+                begins: Begins | None = None) -> Halt:
     """Whether the robot can still stop clear of everything after one step of each command (`rules.stopping`).
 
     The braking trajectory keeps more than `room`, [] [m], from statics. What is admissible leaves an admissible command
-    for the next step: to go on braking. `steps` control steps are followed.
+    for the next step: to go on braking. `steps` control steps are followed. What candidates that begin alike meet is
+    worked out once; without `begins` none are alike.
     """
-    distinct = profiles.v[: begins.v[0][1]], profiles.yaw_rate[: begins.yaw_rate[0][1]]
-    halting = halting_profiles(*distinct, robot, behaviour.dt, steps)
-    (leg,), met = follow(state, halting, 1, (steps,), field, sensed, robot, behaviour, growing_margin,
-                         jnp.float32(-jnp.inf))
+    begins = begins or Begins(((0, profiles.v.shape[0]),), ((0, profiles.yaw_rate.shape[0]),))
+    v, yaw_rate = profiles.v[: begins.v[0][1]], profiles.yaw_rate[: begins.yaw_rate[0][1]]
+    halting = halting_profiles(v, yaw_rate, robot, behaviour.dt, steps)
+    through = jnp.float32(-jnp.inf)  # it is judged by the whole way
+    (leg,), met = follow(state, halting, 1, (steps,), field, sensed, robot, behaviour, growing_margin, through)
     static, moving = begins.each(leg.static), begins.each(met.moving)
     return Halt(static > room, static, moving)

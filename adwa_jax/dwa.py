@@ -17,11 +17,11 @@ from adwa_jax.prediction import Prediction, candidate_clearance, clearance_now, 
 from adwa_jax.profiles import (
     Begins,
     Profiles,
-    begins_of,
     ramped_profiles,
     speed_targets,
     speeds_over_range,
     turn_targets,
+    turns_begin,
     window_profiles,
     yaw_rates_over_range,
 )
@@ -149,7 +149,7 @@ def _judged_beyond(state: RobotState, field: DistanceField, sensed: Sensed, cons
     clearance = found.static if rules.mover_terms else jnp.minimum(found.static, found.moving)
     if rules.stopping:
         halt = halts_clear(state, profiles, field, sensed, robot, behaviour, dwa.halt_steps, rules.mover_margin, room,
-                           _begins(options))
+                           begins_of(options))
         admissible = halt.clear_of_statics & (halt.moving > 0)
         badness = jnp.where(halt.clear_of_statics, -found.contact_time - 0.01 * jnp.clip(halt.moving, -1.0, 1.0),
                             1e3 - halt.static)
@@ -173,12 +173,15 @@ def candidate_profiles(state: RobotState, constants: Constants, options: Options
     return ramped_profiles(state.v, state.yaw_rate, speeds, turns, robot, dt, steps, dwa.stride, dwa.turn_step)
 
 
-def _begins(options: Options) -> Begins:
-    """Which candidates begin alike: over the whole range of speeds, full speed and halt are among those held."""
+def begins_of(options: Options) -> Begins:
+    """Which of the candidates begin alike."""
     rules, dwa = options.rules, options.dwa
     held = dwa.v_samples + (rules.ramp and rules.reverse)
-    v = ((0, held), (dwa.v_samples - 1, dwa.v_samples), (0, 1)) if rules.ramp else ((0, held + 2),)
-    return begins_of(v if rules.second_phase else ((0, held),), dwa.yaw_rate_samples, rules.second_phase)
+    if not rules.second_phase:
+        return Begins(((0, held),), ((0, dwa.yaw_rate_samples),))
+    # Over the whole range full speed and halt are among the speeds held.
+    speeds = ((0, held), (dwa.v_samples - 1, dwa.v_samples), (0, 1)) if rules.ramp else ((0, held + 2),)
+    return Begins(speeds, turns_begin(dwa.yaw_rate_samples))
 
 
 def _watched(options: Options) -> int:

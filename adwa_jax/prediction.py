@@ -1,9 +1,9 @@
 """What becomes of each candidate: where it gets to, how near to obstacles, and when it meets a mover.
 
-Dimension letters: V, N candidates; K predicted points; D discs of the robot.
+Dimension letters: V, N candidates, C = V·N in one row; K predicted points; D discs of the robot.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -55,7 +55,7 @@ class Met(NamedTuple):
 
 
 class _Carry(NamedTuple):
-    """Candidates in one row of C = V·N, which the costly loops take in whole vectors."""
+    """What costs most is worked out for all candidates in one row, which fills the machine's vectors."""
 
     x: jax.Array  # [C]
     y: jax.Array  # [C]
@@ -218,10 +218,14 @@ def follow(state: RobotState, profiles: Profiles, stride: int, ends: tuple[int, 
     rows = ahead, jax.tree.map(lambda rows: jnp.concatenate([rows[1:], rows[-1:]]), ahead), times
     legs, clearances = [], []
     for first, last in zip((0, *ends), ends, strict=False):
-        carry, moving = lax.scan(body_fun, carry, jax.tree.map(lambda rows: rows[first:last], rows))
+        carry, moving = lax.scan(body_fun, carry, _between(rows, first, last))
         legs.append(Leg(*(value.reshape(shape) for value in (carry.x, carry.y, carry.static))))
         clearances += list(moving)
     return legs, _met(clearances, times, shape)
+
+
+def _between(rows: Any, first: int, last: int) -> Any:
+    return jax.tree.map(lambda leaf: leaf[first:last], rows)
 
 
 def _met(clearances: list[jax.Array], times: jax.Array, shape: tuple[int, int]) -> Met:

@@ -13,6 +13,8 @@ from jax import lax
 from adwa_jax.grid import Scalar
 from adwa_jax.window import RobotLimits
 
+Runs = tuple[tuple[int, int], ...]
+
 
 class Profiles(NamedTuple):
     """Velocities commanded, and reached over time."""
@@ -31,12 +33,12 @@ class Targets(NamedTuple):
 
 
 class Begins(NamedTuple):
-    """Which candidates begin with the same command: the first speeds and yaw rates are distinct, and the runs (begin,
-    end) of these, one after another, are those of all candidates.
+    """Which candidates begin with the same command. The first of V and of N are distinct; runs (begin, end) of them,
+    one after another, are the commands of all, and the first run is the distinct ones themselves.
     """
 
-    v: tuple[tuple[int, int], ...]
-    yaw_rate: tuple[tuple[int, int], ...]
+    v: Runs
+    yaw_rate: Runs
 
     def each(self, values: jax.Array) -> jax.Array:
         """[V, N] values of all candidates from those of the distinct commands."""
@@ -101,11 +103,10 @@ def turn_targets(held: jax.Array, second_phase: bool) -> Targets:
                    jnp.concatenate([held, jnp.zeros_like(turning), -turning]))
 
 
-def begins_of(v: tuple[tuple[int, int], ...], yaw_rates: int, second_phase: bool) -> Begins:
-    """Of the candidates of `turn_targets` of so many yaw rates."""
-    half = yaw_rates // 2
-    turning = ((0, half), (half + 1, yaw_rates)) * 2 if second_phase else ()
-    return Begins(v, ((0, yaw_rates), *turning))
+def turns_begin(held: int) -> Runs:
+    """Which of so many yaw rates held those of `turn_targets` with a second phase begin with."""
+    half = held // 2
+    return ((0, held), *((0, half), (half + 1, held)) * 2)
 
 
 def halting_profiles(v: jax.Array, yaw_rate: jax.Array, robot: RobotLimits, dt: Scalar, steps: int) -> Profiles:

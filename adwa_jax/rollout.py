@@ -116,7 +116,7 @@ def cosine_sine(angle: jax.Array) -> tuple[jax.Array, jax.Array]:
 
 
 def _series(coefficients: tuple[float, ...], value: jax.Array) -> jax.Array:
-    total = jnp.float32(coefficients[-1])
+    total = jnp.full_like(value, coefficients[-1])
     for coefficient in coefficients[-2::-1]:
         total = total * value + coefficient
-    return jnp.asarray(total)
+    return total
