@@ -4,14 +4,13 @@ from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
-from jax import lax
 
 from adwa_jax.constants import Behaviour
 from adwa_jax.grid import DistanceField
-from adwa_jax.obstacles import NOWHERE, Sensed
-from adwa_jax.prediction import mover_clearance, static_clearance
-from adwa_jax.profiles import Profiles, halting_profiles
-from adwa_jax.rollout import Points, RobotState, points
+from adwa_jax.obstacles import Sensed
+from adwa_jax.prediction import follow
+from adwa_jax.profiles import Begins, Profiles, halting_profiles
+from adwa_jax.rollout import RobotState
 from adwa_jax.window import RobotLimits
 
 
@@ -35,28 +34,18 @@ def is_admissible(clearance: jax.Array, v: jax.Array, yaw_rate: jax.Array, robot
 
 
 def halts_clear(state: RobotState, profiles: Profiles, field: DistanceField, sensed: Sensed, robot: RobotLimits,
-                behaviour: Behaviour, steps: int, growing_margin: bool, room: jax.Array) -> Halt:
+                behaviour: Behaviour, steps: int, growing_margin: bool, room: jax.Array,
+                begins: Begins | None = None) -> Halt:
     """Whether the robot can still stop clear of everything after one step of each command (`rules.stopping`).
 
     The braking trajectory keeps more than `room`, [] [m], from statics. What is admissible leaves an admissible command
-    for the next step: to go on braking. `steps` control steps are followed.
+    for the next step: to go on braking. `steps` control steps are followed. What candidates that begin alike meet is
+    worked out once; without `begins` none are alike.
     """
-    halting = halting_profiles(profiles.v, profiles.yaw_rate, robot, behaviour.dt, steps)
-    ahead = points(state.heading, halting.yaw_rate_ahead, behaviour.dt)
-
-    def body_fun(carry: tuple, row: tuple[Points, jax.Array, jax.Array]) -> tuple[tuple, None]:
-        x, y, static, moving = carry
-        at, v, count = row
-        x, y = x + v[:, None] * at.move_x[None, :], y + v[:, None] * at.move_y[None, :]
-        cosine, sine, time = at.cosine[None, :], at.sine[None, :], count * behaviour.dt
-        margin = behaviour.mover_margin + behaviour.mover_growth * time if growing_margin else 0.0
-        static = jnp.minimum(static, static_clearance(field, sensed, robot, x, y, cosine, sine))
-        moving = jnp.minimum(moving, mover_clearance(sensed, robot, x, y, cosine, sine, time) - margin)
-        return (x, y, static, moving), None
-
-    shape = (profiles.v.shape[0], profiles.yaw_rate.shape[0])
-    nowhere = jnp.full(shape, NOWHERE, jnp.float32)
-    rows = (ahead, halting.v_ahead, jnp.arange(1, steps + 1, dtype=jnp.float32))
-    begin = (jnp.broadcast_to(state.x, shape), jnp.broadcast_to(state.y, shape), nowhere, nowhere)
-    (_, _, static, moving), _ = lax.scan(body_fun, begin, rows)
+    begins = begins or Begins(((0, profiles.v.shape[0]),), ((0, profiles.yaw_rate.shape[0]),))
+    v, yaw_rate = profiles.v[: begins.v[0][1]], profiles.yaw_rate[: begins.yaw_rate[0][1]]
+    halting = halting_profiles(v, yaw_rate, robot, behaviour.dt, steps)
+    through = jnp.float32(-jnp.inf)  # it is judged by the whole way
+    (leg,), met = follow(state, halting, 1, (steps,), field, sensed, robot, behaviour, growing_margin, through)
+    static, moving = begins.each(leg.static), begins.each(met.moving)
     return Halt(static > room, static, moving)

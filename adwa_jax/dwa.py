@@ -15,11 +15,13 @@ from adwa_jax.grid import DistanceField, Scalar
 from adwa_jax.obstacles import Sensed
 from adwa_jax.prediction import Prediction, candidate_clearance, clearance_now, predict
 from adwa_jax.profiles import (
+    Begins,
     Profiles,
     ramped_profiles,
     speed_targets,
     speeds_over_range,
     turn_targets,
+    turns_begin,
     window_profiles,
     yaw_rates_over_range,
 )
@@ -146,7 +148,8 @@ def _judged_beyond(state: RobotState, field: DistanceField, sensed: Sensed, cons
                     rules.mover_margin, wider if rules.stopping else None)
     clearance = found.static if rules.mover_terms else jnp.minimum(found.static, found.moving)
     if rules.stopping:
-        halt = halts_clear(state, profiles, field, sensed, robot, behaviour, dwa.halt_steps, rules.mover_margin, room)
+        halt = halts_clear(state, profiles, field, sensed, robot, behaviour, dwa.halt_steps, rules.mover_margin, room,
+                           begins_of(options))
         admissible = halt.clear_of_statics & (halt.moving > 0)
         badness = jnp.where(halt.clear_of_statics, -found.contact_time - 0.01 * jnp.clip(halt.moving, -1.0, 1.0),
                             1e3 - halt.static)
@@ -168,6 +171,17 @@ def candidate_profiles(state: RobotState, constants: Constants, options: Options
     speeds = speed_targets(held, jnp.float32(0.0), jnp.float32(robot.v_max), rules.second_phase)
     turns = turn_targets(yaw_rates_over_range(robot, dwa.yaw_rate_samples), rules.second_phase)
     return ramped_profiles(state.v, state.yaw_rate, speeds, turns, robot, dt, steps, dwa.stride, dwa.turn_step)
+
+
+def begins_of(options: Options) -> Begins:
+    """Which of the candidates begin alike."""
+    rules, dwa = options.rules, options.dwa
+    held = dwa.v_samples + (rules.ramp and rules.reverse)
+    if not rules.second_phase:
+        return Begins(((0, held),), ((0, dwa.yaw_rate_samples),))
+    # Over the whole range full speed and halt are among the speeds held.
+    speeds = ((0, held), (dwa.v_samples - 1, dwa.v_samples), (0, 1)) if rules.ramp else ((0, held + 2),)
+    return Begins(speeds, turns_begin(dwa.yaw_rate_samples))
 
 
 def _watched(options: Options) -> int:

@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 from jax import lax
 
-from adwa_jax.grid import Scalar
+from adwa_jax.grid import Scalar, lesser
 from adwa_jax.scenario import Movers, UnknownSquares
 
 NOWHERE = 1e6  # distance [m] reported to what is absent; finite, so that no arithmetic on it makes a NaN
@@ -203,7 +203,7 @@ def _least(distance: Callable[[jax.Array | int], jax.Array], size: int, count: j
 def _least_of(distance: Callable[[jax.Array | int], jax.Array], indices: Iterable[jax.Array | int],
               least: jax.Array) -> jax.Array:
     for index in indices:
-        least = jnp.minimum(least, distance(index))
+        least = lesser(distance(index), least)
     return least
 
 

@@ -1,9 +1,9 @@
 """What becomes of each candidate: where it gets to, how near to obstacles, and when it meets a mover.
 
-Dimension letters: V, N candidates; K predicted points; D discs of the robot.
+Dimension letters: V, N candidates, C = V·N in one row; K predicted points; D discs of the robot.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -39,12 +39,29 @@ class Prediction(NamedTuple):
     contact_time: jax.Array  # until that clearance falls below 0; the whole watch if it never does [s]
 
 
-class _Carry(NamedTuple):
-    x: jax.Array
-    y: jax.Array
-    static: jax.Array
+class Leg(NamedTuple):
+    """Candidates after some of their steps; [V, N] float32."""
+
+    x: jax.Array  # [m]
+    y: jax.Array  # [m]
+    static: jax.Array  # least clearance to statics until then, from the robot's outline [m]
+
+
+class Met(NamedTuple):
+    """[V, N] float32: as in `Prediction`."""
+
     moving: jax.Array
     contact_time: jax.Array
+
+
+class _Carry(NamedTuple):
+    """What costs most is worked out for all candidates in one row, which fills the machine's vectors."""
+
+    x: jax.Array  # [C]
+    y: jax.Array  # [C]
+    next_x: jax.Array  # [V, N] after the next step, if nothing is in the way
+    next_y: jax.Array  # [V, N]
+    static: jax.Array  # [C]
 
 
 def candidate_clearance(state: RobotState, v: jax.Array, arc: Arcs, field: DistanceField, sensed: Sensed,
@@ -161,36 +178,63 @@ def predict(state: RobotState, profiles: Profiles, horizon: int, stride: int, fi
     With `room`, [] [m], a candidate stays where it would come nearer than that to a static obstacle; else it drives on
     through it. With `growing_margin` movers are `mover_margin` + `mover_growth` · time larger.
     """
-    ahead = points(state.heading, profiles.yaw_rate_ahead, behaviour.dt, stride)
-    step = behaviour.dt * stride
+    steps, half = profiles.v_ahead.shape[0], max(horizon // 2, 1)
+    legs, met = follow(state, profiles, stride, (half, horizon, steps), field, sensed, robot, behaviour, growing_margin,
+                       jnp.float32(-jnp.inf) if room is None else room)
+    middle, end, _ = legs
+    headings = state.heading + jnp.cumsum(profiles.yaw_rate_ahead[:horizon] * (behaviour.dt * stride), axis=0)
+    return Prediction(headings, (middle.x, middle.y), Pose(end.x, end.y, headings[-1][None, :]), end.static,
+                      met.moving, met.contact_time)
 
-    def body_fun(carry: _Carry, row: tuple[Points, jax.Array, jax.Array]) -> tuple[_Carry, tuple]:
-        at, v, count = row
-        x, y = carry.x + v[:, None] * at.move_x[None, :], carry.y + v[:, None] * at.move_y[None, :]
-        here = static_clearance(field, sensed, robot, x, y, at.cosine[None, :], at.sine[None, :])
-        static = jnp.minimum(carry.static, here)
-        if room is not None:
-            free = static > room
-            x, y = jnp.where(free, x, carry.x), jnp.where(free, y, carry.y)
-        time = count * step
+
+def follow(state: RobotState, profiles: Profiles, stride: int, ends: tuple[int, ...], field: DistanceField,
+           sensed: Sensed, robot: RobotLimits, behaviour: Behaviour, growing_margin: bool,
+           room: jax.Array) -> tuple[list[Leg], Met]:
+    """The candidates after so many steps as each of `ends` says, the last of them all; and the movers they meet.
+
+    The rest as for `predict`.
+    """
+    shape = profiles.v_ahead.shape[1], profiles.yaw_rate_ahead.shape[1]
+    times = jnp.arange(1, ends[-1] + 1, dtype=jnp.float32) * (behaviour.dt * stride)
+    ahead = points(state.heading, profiles.yaw_rate_ahead, behaviour.dt, stride), profiles.v_ahead
+
+    def moved(x: jax.Array, y: jax.Array, at: Points, v: jax.Array) -> tuple[jax.Array, jax.Array]:
+        return (x.reshape(shape) + v[:, None] * at.move_x[None, :], y.reshape(shape) + v[:, None] * at.move_y[None, :])
+
+    def body_fun(carry: _Carry, row: tuple[tuple, tuple, jax.Array]) -> tuple[_Carry, jax.Array]:
+        (at, _), following, time = row
+        cosine, sine = (jnp.tile(part, shape[0]) for part in (at.cosine, at.sine))
+        # Worked out where it is looked up, instead of carried, the next point would cost as much as the look-up.
+        x, y = carry.next_x.reshape(-1), carry.next_y.reshape(-1)
+        static = lesser(static_clearance(field, sensed, robot, x, y, cosine, sine), carry.static)
+        free = static > room
+        x, y = jnp.where(free, x, carry.x), jnp.where(free, y, carry.y)
         margin = behaviour.mover_margin + behaviour.mover_growth * time if growing_margin else 0.0
-        moving = mover_clearance(sensed, robot, x, y, at.cosine[None, :], at.sine[None, :], time) - margin
-        touched = (moving < 0) & (carry.moving >= 0)
-        carry = _Carry(x, y, static, jnp.minimum(carry.moving, moving), jnp.where(touched, time, carry.contact_time))
-        return carry, (x, y, static)
+        moving = mover_clearance(sensed, robot, x, y, cosine, sine, time) - margin
+        return _Carry(x, y, *moved(x, y, *following), static), moving
 
-    steps, v_count = profiles.v_ahead.shape
-    shape = (v_count, profiles.yaw_rate_ahead.shape[1])
-    rows = (ahead, profiles.v_ahead, jnp.arange(1, steps + 1, dtype=jnp.float32))
-    whole = jnp.float32(steps) * step
-    begin = _Carry(jnp.broadcast_to(state.x, shape), jnp.broadcast_to(state.y, shape),
-                   jnp.full(shape, NOWHERE, jnp.float32), jnp.full(shape, NOWHERE, jnp.float32),
-                   jnp.broadcast_to(whole, shape))  # fmt: skip
-    last, (x, y, static) = lax.scan(body_fun, begin, rows)
-    headings = state.heading + jnp.cumsum(profiles.yaw_rate_ahead[:horizon] * step, axis=0)
-    end = Pose(x[horizon - 1], y[horizon - 1], headings[-1][None, :])
-    half = max(horizon // 2, 1) - 1
-    return Prediction(headings, (x[half], y[half]), end, static[horizon - 1], last.moving, last.contact_time)
+    x, y, static = (jnp.broadcast_to(value, shape[0] * shape[1]) for value in (state.x, state.y, jnp.float32(NOWHERE)))
+    carry = _Carry(x, y, *moved(x, y, *jax.tree.map(lambda rows: rows[0], ahead)), static)
+    rows = ahead, jax.tree.map(lambda rows: jnp.concatenate([rows[1:], rows[-1:]]), ahead), times
+    legs, clearances = [], []
+    for first, last in zip((0, *ends), ends, strict=False):
+        carry, moving = lax.scan(body_fun, carry, _between(rows, first, last))
+        legs.append(Leg(*(value.reshape(shape) for value in (carry.x, carry.y, carry.static))))
+        clearances += list(moving)
+    return legs, _met(clearances, times, shape)
+
+
+def _between(rows: Any, first: int, last: int) -> Any:
+    return jax.tree.map(lambda leaf: leaf[first:last], rows)
+
+
+def _met(clearances: list[jax.Array], times: jax.Array, shape: tuple[int, int]) -> Met:
+    """Of the clearances [C] after each step."""
+    least, contact_time = clearances[-1], times[-1]
+    for clearance, time in zip(clearances[::-1], times[::-1], strict=True):
+        least = lesser(clearance, least)
+        contact_time = jnp.where(clearance < 0, time, contact_time)
+    return Met(least.reshape(shape), contact_time.reshape(shape))
 
 
 def static_clearance(field: DistanceField, sensed: Sensed, robot: RobotLimits, x: jax.Array, y: jax.Array,

@@ -8,9 +8,12 @@ from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
+from jax import lax
 
 from adwa_jax.grid import Scalar
 from adwa_jax.window import RobotLimits
+
+Runs = tuple[tuple[int, int], ...]
 
 
 class Profiles(NamedTuple):
@@ -27,6 +30,21 @@ class Targets(NamedTuple):
 
     first: jax.Array  # [A] float32
     second: jax.Array  # [A] float32
+
+
+class Begins(NamedTuple):
+    """Which candidates begin with the same command. The first of V and of N are distinct; runs (begin, end) of them,
+    one after another, are the commands of all, and the first run is the distinct ones themselves.
+    """
+
+    v: Runs
+    yaw_rate: Runs
+
+    def each(self, values: jax.Array) -> jax.Array:
+        """[V, N] values of all candidates from those of the distinct commands."""
+        for axis, runs in enumerate(self):
+            values = jnp.concatenate([lax.slice_in_dim(values, *run, axis=axis) for run in runs], axis=axis)
+        return values
 
 
 def window_profiles(v: jax.Array, yaw_rate: jax.Array, steps: int, turn_step: int, second_phase: bool) -> Profiles:
@@ -83,6 +101,12 @@ def turn_targets(held: jax.Array, second_phase: bool) -> Targets:
     turning = jnp.concatenate([held[:half], held[half + 1 :]])
     return Targets(jnp.concatenate([held, turning, turning]),
                    jnp.concatenate([held, jnp.zeros_like(turning), -turning]))
+
+
+def turns_begin(held: int) -> Runs:
+    """Which of so many yaw rates held those of `turn_targets` with a second phase begin with."""
+    half = held // 2
+    return ((0, held), *((0, half), (half + 1, held)) * 2)
 
 
 def halting_profiles(v: jax.Array, yaw_rate: jax.Array, robot: RobotLimits, dt: Scalar, steps: int) -> Profiles:

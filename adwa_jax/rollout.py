@@ -8,6 +8,11 @@ from jax import lax
 
 from adwa_jax.grid import Scalar
 
+# sin(h) = h · Σ SINE[i] · h²ⁱ and cos(h) = Σ COSINE[i] · h²ⁱ for h in [−π/2, π/2]: interpolated at Chebyshev's points
+# of h², within 5e-9 and 5e-8.
+SINE = (0.999999996, -0.166666579, 0.00833305009, -0.000198090111, 2.60509296e-06)
+COSINE = (0.999999953, -0.499999047, 0.0416635722, -0.00138536226, 2.31522567e-05)
+
 
 class Pose(NamedTuple):
     """Position and heading; arrays of one shape."""
@@ -98,4 +103,20 @@ def points(heading: jax.Array, yaw_rate_ahead: jax.Array, dt: Scalar, stride: in
     turned = jnp.cumsum(yaw_rate_ahead * (stride * dt), axis=0)
     after = heading + turned
     along = after - yaw_rate_ahead * (dt * ((stride + 1) / 2))
-    return Points(jnp.cos(along) * (stride * dt), jnp.sin(along) * (stride * dt), jnp.cos(after), jnp.sin(after))
+    (move_x, move_y), (cosine, sine) = cosine_sine(along), cosine_sine(after)
+    return Points(move_x * (stride * dt), move_y * (stride * dt), cosine, sine)
+
+
+def cosine_sine(angle: jax.Array) -> tuple[jax.Array, jax.Array]:
+    """Of angles up to some turns [rad], within 5e-7: a tenth of the library's cost, which suits any angle."""
+    half = 0.5 * wrap(angle)  # in [−π/2, π/2], where few terms do
+    squared = half * half
+    sine, cosine = half * _series(SINE, squared), _series(COSINE, squared)
+    return 1.0 - 2.0 * sine * sine, 2.0 * sine * cosine
+
+
+def _series(coefficients: tuple[float, ...], value: jax.Array) -> jax.Array:
+    total = jnp.full_like(value, coefficients[-1])
+    for coefficient in coefficients[-2::-1]:
+        total = total * value + coefficient
+    return total

@@ -103,7 +103,7 @@ def mean_heading_term(state: RobotState, headings: jax.Array, target: jax.Array,
     """
     bearing = state.heading + turn_towards(state.x, state.y, state.heading, target)
     off = jnp.abs(wrap(headings - bearing))
-    return jnp.broadcast_to(jnp.pi - jnp.mean(off, axis=0)[None, :], shape)
+    return jnp.broadcast_to(jnp.pi - (sum(off[1:], off[0]) / headings.shape[0])[None, :], shape)
 
 
 def turn_towards(x: jax.Array, y: jax.Array, heading: jax.Array, target: jax.Array) -> jax.Array:

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from adwa_jax.dwa import candidate_profiles
+from adwa_jax.dwa import begins_of, candidate_profiles
 from adwa_jax.presets import extended, paper, preset
 from adwa_jax.profiles import Targets, halting_profiles, ramped_profiles, window_profiles, yaw_rates_over_range
 from adwa_jax.rules import EVERY_RULE, Rules
@@ -149,6 +149,22 @@ def test_no_candidate_of_any_mix_of_rules_asks_for_more_than_the_robot_can(rules
         steps = options.dwa.horizon_steps + (options.dwa.watch_beyond if rules.long_watch else 0)
         assert found.v_ahead.shape == (steps, *found.v.shape)
         assert found.yaw_rate_ahead.shape == (steps, *found.yaw_rate.shape)
+
+
+@pytest.mark.parametrize("rules", [EVERY_RULE, EVERY_RULE.without("reverse"), EVERY_RULE.without("ramp"),
+                                   EVERY_RULE.without("second_phase"), Rules()],
+                         ids=["every", "no reverse", "no ramp", "no second phase", "none"])
+def test_candidates_said_to_begin_alike_do_so(rules):
+    found, _, options = commands(rules, 0.5, 0.3)
+    begins = begins_of(options)
+    v, yaw_rate = (np.concatenate([values[begin:end] for begin, end in runs])
+                   for values, runs in ((found.v, begins.v), (found.yaw_rate, begins.yaw_rate)))
+    np.testing.assert_array_equal(found.v, v)
+    np.testing.assert_array_equal(found.yaw_rate, yaw_rate)
+    distinct = found.v[: begins.v[0][1], None] + 10 * found.yaw_rate[None, : begins.yaw_rate[0][1]]
+    np.testing.assert_array_equal(begins.each(jnp.asarray(distinct)), found.v[:, None] + 10 * found.yaw_rate[None, :])
+    if rules == EVERY_RULE:  # 6 speeds and reverse, 9 yaw rates, of 9 and 25
+        assert distinct.shape == (7, 9)
 
 
 def test_extended_candidates_by_hand():

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from adwa_jax.rollout import Pose, euler_step, points, rollout
+from adwa_jax.rollout import Pose, cosine_sine, euler_step, points, rollout
 from tests.reference import dwa as reference
 from tests.test_adwa_jax.worlds import many_examples
 
@@ -129,3 +129,15 @@ def test_double_steps_are_two_euler_steps_but_for_the_bend_between_them(heading,
         np.testing.assert_allclose([found.cosine[k, 0], found.sine[k, 0]], [math.cos(heading), math.sin(heading)],
                                    atol=1e-5)
     assert off < 2e-6
+
+
+def test_cosine_and_sine_of_headings_of_some_turns():
+    angle = np.concatenate([np.linspace(-20.0, 20.0, 4001), np.arange(-6, 7) * np.pi / 2]).astype(np.float32)
+    cosine, sine = jax.jit(cosine_sine)(angle)
+    np.testing.assert_allclose(cosine, np.cos(angle.astype(float)), atol=1.5e-6)  # as exact as the angles' own steps
+    np.testing.assert_allclose(sine, np.sin(angle.astype(float)), atol=1.5e-6)
+    near = np.abs(angle) < 3.1
+    np.testing.assert_allclose(cosine[near], np.cos(angle[near].astype(float)), atol=5e-7)
+    np.testing.assert_allclose(sine[near], np.sin(angle[near].astype(float)), atol=5e-7)
+    slopes = jax.vmap(jax.grad(lambda angle: sum(cosine_sine(angle))))(jnp.asarray(angle))
+    np.testing.assert_allclose(slopes, np.cos(angle.astype(float)) - np.sin(angle.astype(float)), atol=1e-5)
