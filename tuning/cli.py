@@ -1,4 +1,4 @@
-"""The command `adwa`: plan, evaluate, ablate, weights, drive, suite make, suite show, demo.
+"""The command `adwa`: plan, evaluate, ablate, weights, drive, suite make, suite show, tune, demo.
 
 Exit code 0: done; 1: ran, but found nothing; 2: bad input, said in one line.
 """
@@ -58,6 +58,7 @@ from tuning.planning import PlannedPath, as_json, plan_paths, planner_constants,
 from tuning.results import Results
 from tuning.sources import Source, Work, options_named, read_grid, read_queries, read_suite
 from tuning.suite_files import KINDS, suite_in
+from tuning.tune_cli import tune_app
 from tuning.weights_file import load_weight_rule, parse_weight_rule, weights_text
 
 app = typer.Typer(
@@ -66,6 +67,7 @@ app = typer.Typer(
 )  # fmt: skip
 suite_app = typer.Typer(help="Write suites of scenarios to a file, and picture them.")
 app.add_typer(suite_app, name="suite")
+app.add_typer(tune_app, name="tune")
 
 FOUND_NOTHING, BAD_INPUT, INTERRUPTED = 1, 2, 130
 LARGEST_RADIUS = 1e6  # [m]
@@ -88,6 +90,7 @@ class ScopeName(StrEnum):
 
 @app.callback(invoke_without_command=True)
 @suite_app.callback(invoke_without_command=True)
+@tune_app.callback(invoke_without_command=True)
 def help_alone(context: typer.Context) -> None:
     """Without a command: how to give one."""
     if context.invoked_subcommand is None:
@@ -390,7 +393,8 @@ def main() -> None:
 
 
 def _fail(message: str) -> None:
-    print("adwa: " + " ".join(message.split()), file=sys.stderr)
+    for line in message.splitlines():
+        print("adwa: " + " ".join(line.split()), file=sys.stderr)
     sys.exit(BAD_INPUT)
 
 

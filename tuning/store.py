@@ -53,14 +53,16 @@ class Store:
         self._arrays = self._opened()
         self._marks = np.zeros((0, len(self.tiles)), np.uint64)  # [W, T], those that hold
 
-    def admit(self, first: int, values: np.ndarray, generation: int) -> np.ndarray:
-        """Let candidates first, first + 1, … have the constants [C, D]; [C, T] bool: which tiles are done with them."""
+    def admit(self, first: int, values: np.ndarray, generation: np.ndarray) -> np.ndarray:
+        """Let the rows from first have the constants [C, D], asked for by generation [C]; [C, T] bool: which of their
+        tiles are done.
+        """
         last = first + len(values)
         self._grow(last)
         rows = slice(first, last)
         if not _same(self._arrays["values"], rows, values):
             self._arrays["values"][rows] = values
-        if not _same(self._arrays["generation"], rows, np.full(len(values), generation, np.int32)):
+        if not _same(self._arrays["generation"], rows, generation):
             self._arrays["generation"][rows] = generation
         self._marks[rows] = _holding(self._arrays, rows, values, self.tiles)[0]
         return self._marks[rows] > 0
