@@ -37,7 +37,7 @@ class Member:
     values: np.ndarray  # [D]
     training: Judgement
     held_out: Judgement | None  # None: not driven there
-    non_dominated: float  # share of the resamples in which no other candidate dominates it
+    non_dominated: float  # share of the resamples in which it is feasible and no other candidate dominates it
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class Choice:
 
     rule: str  # of choice.RULES
     member: int  # index into the front
-    stability: float  # share of the resamples in which the same member is picked
+    stability: float  # share of the resamples in which the same of the front's members is picked; low among near-equals
     reason: str  # one sentence for people
 
 
@@ -76,9 +76,14 @@ class Findings:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Paired differences, recommended − default, on common scenarios, with 95 % intervals."""
+    """Paired differences, recommended − default, on common scenarios, with 95 % intervals.
+
+    What counts the successes alone is compared on the scenarios that both solve: else who solves more, and so the hard
+    ones as well, would look worse.
+    """
 
     success: Interval  # Newcombe's for paired proportions
-    objectives: tuple[Interval, ...]  # O, by bootstrap over scenarios
+    objectives: tuple[Interval, ...]  # O; rates by Newcombe's, others by bootstrap over scenarios; own units
     better_on_all: bool  # whether some front member beats the default on every objective, point estimates
     why_not: str  # the sentence for it, if none does; else empty
+    better_member: int | None = None  # index into the front of the one that does
