@@ -7,7 +7,7 @@ STAMP := .venv/.installed
 .PHONY: demo test bench lint figures clean
 
 demo: $(STAMP)
-	$(BIN)/adwa demo --out out
+	$(BIN)/adwa demo --out out/demo
 
 test: $(STAMP)
 	$(BIN)/python -m pytest

@@ -140,7 +140,7 @@ class Job(Table):
     objectives: list[ObjectiveTable] | None = Field(None, min_length=1)
     constraints: list[ConstraintTable] = []
     method: MethodTable
-    choice: ChoiceSettings = Field(default_factory=lambda: ChoiceSettings())
+    choice: ChoiceSettings = Field(default_factory=lambda: ChoiceSettings.model_validate({}))
 
 
 def load_job(path: Path, folder: Path | None = None) -> Job:

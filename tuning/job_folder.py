@@ -7,7 +7,6 @@ import os
 import platform
 import re
 import subprocess
-import sys
 import time
 import zipfile
 from collections.abc import Callable, Iterator, Mapping
@@ -95,6 +94,11 @@ def environment_of(folder: Path) -> dict[str, Any]:
                          "begun; name one, or begin: adwa tune run JOB --out DIR") from None  # fmt: skip
 
 
+def home_of(environment: Mapping[str, Any]) -> Path:
+    """The folder that the job file's paths are relative to."""
+    return Path(environment["job_file"]).parent
+
+
 def require_unchanged(folder: Path, before: Mapping[str, str], now: Mapping[str, str]) -> None:
     """Raises InputError where the job file's suites or weights are no longer what they were."""
     changed = [place for place in before if now.get(place) != before[place]]
@@ -106,8 +110,7 @@ def require_unchanged(folder: Path, before: Mapping[str, str], now: Mapping[str,
 def environment_now() -> dict[str, Any]:
     """Versions, machine and revision of this process."""
     return {"versions": {"python": platform.python_version(), **{name: _version(name) for name in PACKAGES}},
-            "revision": _revision(), "platform": platform.platform(), "processors": usable_cores(),
-            "command": sys.argv[0].rpartition("/")[2]}  # fmt: skip
+            "revision": _revision(), "platform": platform.platform(), "processors": usable_cores()}  # fmt: skip
 
 
 def differing_versions(environment: Mapping[str, Any]) -> list[str]:

@@ -5,29 +5,15 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import timedelta
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
-from tuning.console import note, progress_bar
-from tuning.job_folder import (
-    JOB,
-    Log,
-    begin,
-    differing_versions,
-    environment_of,
-    events_of,
-    holder,
-    locked,
-    require_free,
-    require_unchanged,
-    storing,
-)
+from tuning.console import note
+from tuning.findings import Findings
+from tuning.job_folder import JOB, environment_of, events_of, holder, home_of
 from tuning.options import QuietOption
 from tuning.outputs import check_folder
-
-if TYPE_CHECKING:  # brings much with it that other commands do not need
-    from tuning.job_checks import Setup
 
 tune_app = typer.Typer(help="Tune constants: jobs that go on after a kill and end in a report.")
 JobArgument = Annotated[Path, typer.Argument(metavar="JOB", help="The job file, TOML.")]
@@ -38,7 +24,9 @@ RECENT = 20  # blocks of episodes, by which speed is told
 @tune_app.command("check")
 def check_command(job: JobArgument, quiet: QuietOption = False) -> None:
     """Check a job file whole, its suites included, and run nothing."""
-    setup = _read(job, job.resolve().parent, quiet)
+    from tuning.run_job import read_setup
+
+    setup = read_setup(job, job.resolve().parent, quiet)
     if not quiet:
         counts = {"training scenarios": setup.training.scenarios, "held-out scenarios": setup.held_out.scenarios,
                   "parameters": setup.space.parameters, "objectives": setup.goals.objectives}  # fmt: skip
@@ -52,27 +40,22 @@ def run_command(
     quiet: QuietOption = False,
 ) -> None:
     """Run a job to its end."""
+    from tuning.run_job import run_job
+
     check_folder("--out", out)
-    require_free(out)
-    setup = _read(job, job.resolve().parent, quiet)
-    with storing(out):
-        out.mkdir(parents=True, exist_ok=True)
-        with locked(out):
-            require_free(out)
-            begin(out, job, setup.job.seed, setup.inputs)
-            _work(out, setup, quiet)
+    with _told_to_stop(out):
+        findings = run_job(job, out, quiet)
+    _tell(out, findings, quiet)
 
 
 @tune_app.command("resume")
 def resume_command(folder: FolderArgument, quiet: QuietOption = False) -> None:
     """Go on with a job that was ended; what is done is not done again."""
-    environment_of(folder)
-    with storing(folder), locked(folder):
-        setup = _reread(folder, quiet)
-        for difference in differing_versions(environment_of(folder)):
-            note(f"adwa: {difference} since the job began; last bits of new figures may differ")
-            Log(folder).write("version", difference=difference)
-        _work(folder, setup, quiet)
+    from tuning.run_job import resume_job
+
+    with _told_to_stop(folder):
+        findings = resume_job(folder, quiet)
+    _tell(folder, findings, quiet)
 
 
 @tune_app.command("status")
@@ -80,20 +63,16 @@ def status_command(folder: FolderArgument) -> None:
     """How far a job is, the best so far, and the time left."""
     from tuning.job_file import load_job
 
-    job = load_job(folder / JOB, _home(environment_of(folder)))
+    job = load_job(folder / JOB, home_of(environment_of(folder)))
     print("\n".join(status_lines(job.name, job.method.episodes, events_of(folder), holder(folder))))
 
 
 @tune_app.command("report")
 def report_command(folder: FolderArgument, quiet: QuietOption = False) -> None:
     """Write the report anew, of what is done."""
-    from tuning.run_job import write_findings
+    from tuning.run_job import report_job
 
-    setup = _reread(folder, quiet)
-    with storing(folder):
-        finished = write_findings(folder, setup, environment_of(folder))
-    if not quiet:
-        print(f"wrote {finished.report} and {finished.recommended}")
+    _tell(folder, report_job(folder, quiet), quiet)
 
 
 def status_lines(name: str, budget: int, events: list[dict[str, Any]], process: str | None) -> list[str]:
@@ -119,46 +98,17 @@ def status_lines(name: str, budget: int, events: list[dict[str, Any]], process: 
     return lines
 
 
-def _work(folder: Path, setup: "Setup", quiet: bool) -> None:
-    """Run, and tell the end or, if it is interrupted, how to go on."""
-    from tuning.run_job import run_job, success_lines
+def _tell(folder: Path, findings: Findings, quiet: bool) -> None:
+    from tuning.conclude_job import RECOMMENDED, success_lines
 
-    try:
-        with _termination_as_interrupt():
-            finished = run_job(folder, setup, environment_of(folder), quiet)
-    except KeyboardInterrupt:
-        note(f"adwa: stopped; what is done is kept; go on with: adwa tune resume {folder}")
-        raise
     if not quiet:
-        print("\n".join(success_lines(finished.findings)))
-        print(f"wrote {finished.report} and {finished.recommended}")
-
-
-def _read(path: Path, home: Path, quiet: bool) -> "Setup":
-    from tuning.job_checks import set_up
-    from tuning.job_file import load_job
-
-    job = load_job(path, home)
-    with progress_bar("making scenarios", quiet) as progress:
-        return set_up(job, path, home, quiet, progress)
-
-
-def _reread(folder: Path, quiet: bool) -> "Setup":
-    """The setup of a job that has begun; InputError if its files have changed since."""
-    environment = environment_of(folder)
-    setup = _read(folder / JOB, _home(environment), quiet)
-    require_unchanged(folder, environment["inputs"], setup.inputs)
-    return setup
-
-
-def _home(environment: dict[str, Any]) -> Path:
-    """The folder that the job file's paths are relative to."""
-    return Path(environment["job_file"]).parent
+        print("\n".join(success_lines(findings)))
+        print(f"wrote {folder / 'report.html'} and {folder / RECOMMENDED}")
 
 
 @contextmanager
-def _termination_as_interrupt() -> Iterator[None]:
-    """SIGTERM ends the work as Ctrl-C does."""
+def _told_to_stop(folder: Path) -> Iterator[None]:
+    """SIGTERM ends the work as Ctrl-C does, and a line says how to go on."""
 
     def interrupt(*_: Any) -> None:
         raise KeyboardInterrupt
@@ -166,5 +116,9 @@ def _termination_as_interrupt() -> Iterator[None]:
     before = signal.signal(signal.SIGTERM, interrupt)
     try:
         yield
+    except KeyboardInterrupt:
+        if (folder / JOB).exists():
+            note(f"adwa: stopped; what is done is kept; go on with: adwa tune resume {folder}")
+        raise
     finally:
         signal.signal(signal.SIGTERM, before)

@@ -47,7 +47,7 @@ def short_report() -> None:
     """Let the report be one line: drawing it is another module's business."""
     stand_in = ModuleType("tuning.report")
 
-    def write_report(folder, job, findings, training, held_out, held_out_rows, remembered, environment):
+    def write_report(folder, job, findings, training, held_out, held_out_rows, remembered, environment, gallery):
         line = f"{job.name} {len(findings.front)} {training.done.sum()} {held_out_rows.tolist()} {sorted(environment)}"
         write_whole(folder / "report.html", line + f" {np.sum(training.columns['length'], dtype=np.float64)}\n")
         return folder / "report.html"

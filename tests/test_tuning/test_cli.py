@@ -532,7 +532,7 @@ MISTAKES = {
     "negative count": (("evaluate", "--suite", "paper-15", "--count", -5), "--count: ", "-5", "try 1"),
     "count beyond all": (("evaluate", "--suite", "paper-15", "--count", 10**20), "--count: ", str(10**20), "try 1"),
     "count of a file": ((*EVALUATE, "--count", 6), "--count", "6", "choose from 1 to 5"),
-    "demo count": (("demo", "--count", 0), "--count", "0", "200"),
+    "claims count": (("claims", "--count", 0), "--count", "0", "200"),
     "negative seed": (("evaluate", "--suite", "paper-15", "--seed", -1), "--seed: ", "-1", "try"),
     "index beyond": (("drive", *EVALUATE[1:], "--index", 5), "--index", "5", "choose a lower one"),
     "negative index": (("drive", *EVALUATE[1:], "--index", -1), "--index", "-1", "first scenario is 0"),

@@ -1,0 +1,46 @@
+import numpy as np
+from PIL import Image
+
+from adwa_jax.episode import Outcome
+from adwa_jax.presets import paper
+from tests.test_tuning.worlds import mixed_suite, part_of
+from tuning.evaluations import Evaluations
+from tuning.failures import failure_pictures, results_of, worst
+from tuning.results import Results
+
+HIT, STUCK, DONE = Outcome.HIT_MOVER, Outcome.STUCK, Outcome.REACHED
+
+
+def results(outcomes, ratios):
+    names = tuple(f"s{index}" for index in range(len(outcomes)))
+    measures = {"length_ratio": np.array(ratios), "hit_while_stopped": np.zeros(len(names))}
+    return Results("drawn", names, np.array(outcomes, np.int32), measures)
+
+
+def test_failures_come_first_each_outcome_once_before_any_twice_then_detours():
+    found = results([HIT, DONE, HIT, STUCK, DONE, HIT], [9.0, 1.1, 9.0, 9.0, 1.4, 9.0])
+    assert worst(found) == [0, 3, 2, 5, 4, 1]
+
+
+def test_worst_are_drawn_with_the_reason(tmp_path):
+    suite = part_of(mixed_suite(), [1, 3, 4])  # a detour that is driven, a goal without a path, too little time
+    found = Results("mixed", suite.names, np.array([DONE, Outcome.NO_PATH, Outcome.TIMEOUT], np.int32),
+                    {"length_ratio": np.array([1.25, 0.0, 0.0]), "hit_while_stopped": np.zeros(3)})  # fmt: skip
+    pictures = failure_pictures(suite, paper(), found, tmp_path, limit=3)
+    assert [picture.caption.split(".")[0] for picture in pictures] == [
+        "walled: no path", "brief: out of time", "detour: a success, but 1"]  # fmt: skip
+    assert "1.25 times the shortest grid path" in pictures[2].caption
+    for picture in pictures:
+        assert picture.path.parent == tmp_path
+        assert min(Image.open(picture.path).size) > 400
+
+
+def test_a_candidates_row_is_read_as_an_evaluation():
+    suite = part_of(mixed_suite(), [1, 3])
+    columns = {"outcome": np.array([[DONE, DONE], [HIT, DONE]], np.int32), "length_ratio": np.array([[1, 2], [3, 4]])}
+    found = results_of(Evaluations(("a",), np.zeros((2, 1)), np.zeros(2, np.int32), columns, np.ones((2, 2), bool)), 1,
+                       suite)  # fmt: skip
+    assert found.names == ("detour", "walled")
+    assert found.outcome.tolist() == [HIT, DONE]
+    assert found.measures["length_ratio"].tolist() == [3, 4]
+    assert "outcome" in columns  # untouched

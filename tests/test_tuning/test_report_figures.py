@@ -1,0 +1,162 @@
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from scenarios.drawing import new_figure
+from tests.test_tuning.findings_by_hand import GOALS, PARAMETERS, VALUES, agreement, evaluations, findings
+from tuning.evaluations import Evaluations
+from tuning.objectives import Goals, Statistic
+from tuning.report_figures import (
+    agreement_figure,
+    axis_label,
+    front_figure,
+    hypervolume_figure,
+    importance_figure,
+    in_units,
+    optimism_figure,
+    parallel_figure,
+    sweep_figure,
+    sweeps,
+)
+
+
+@pytest.fixture(scope="module")
+def training():
+    return evaluations()
+
+
+def labels(figure):
+    return [(ax.get_xlabel(), ax.get_ylabel()) for ax in figure.axes]
+
+
+def drawn_points(ax, label):
+    return np.concatenate([line.get_xydata() for line in ax.lines if line.get_label() == label])
+
+
+def test_labels_name_the_unit_and_what_is_better():
+    assert axis_label(Statistic("success", "max")) == "success rate [%], more is better"
+    assert axis_label(Statistic("time", "min", 0.1)) == "time (worst 10%) [s], less is better"
+    assert axis_label(Statistic("length_ratio", "min")) == "length ratio, less is better"
+    assert in_units(Statistic("collision", "min"), 0.25) == 25.0
+    assert in_units(Statistic("time", "min"), 0.25) == 0.25
+
+
+def test_the_front_is_drawn_for_every_pair_of_objectives_with_default_and_recommended(training):
+    found = findings()
+    figure = front_figure(found, training)
+    assert len(figure.axes) == 6
+    first = figure.axes[0]
+    assert labels(figure)[0] == ("success rate [%], more is better", "length ratio, less is better")
+    best = found.front[0].training.objectives
+    np.testing.assert_allclose(drawn_points(first, "recommended"), [[100 * best[0].value, best[1].value]])
+    assert len(drawn_points(first, "front")) == 3
+    assert len(drawn_points(first, "the same, held out")) == 5  # three of the front, the recommended again, the default
+    assert len(drawn_points(first, "candidate")) == len(VALUES) - 1  # the last was dropped half way
+
+
+def test_without_held_out_and_candidates_the_front_stands_alone():
+    drawn = front_figure(findings(held_out=False)).axes[0]
+    assert {line.get_label() for line in drawn.lines} == {"front", "default constants", "recommended"}
+
+
+def test_one_objective_alone_is_drawn_by_candidate(training):
+    found = findings()
+    alone = type(found)(**vars(found) | {"goals": Goals(GOALS.objectives[:1])})
+    (ax,) = front_figure(alone, training).axes
+    assert ax.get_ylabel() == "success rate [%], more is better"
+    np.testing.assert_allclose(drawn_points(ax, "recommended"), [[4, 100 * found.front[0].training.success.value]])
+
+
+def test_parallel_coordinates_run_from_the_least_to_the_most_of_what_is_shown():
+    ax = parallel_figure(findings()).axes[0]
+    assert [tick.get_text() for tick in ax.get_xticklabels()][:4] == [
+        "clearance", "local heading", "progress", "success rate"]  # fmt: skip
+    texts = [text.get_text() for text in ax.texts]
+    assert texts[:2] == ["0.4", "0.05"]  # clearance of rows 0, 4, 5, 6: 0.1, 0.3125, 0.4, 0.05
+    default = drawn_points(ax, "default constants")
+    assert default[0, 1] == pytest.approx((0.1 - 0.05) / 0.35)
+
+
+def test_a_sweep_is_found_where_one_parameter_varies_alone(training):
+    (sweep,) = sweeps(training)
+    assert PARAMETERS[sweep.parameter] == "clearance"
+    assert sweep.rows.tolist() == [1, 0, 2, 3]  # 0.0, 0.1 (the default), 0.2, 0.3
+
+
+def test_a_sweep_about_a_default_out_of_range_is_found_at_the_end_of_the_range():
+    values = np.array([[0.1, 2.0], [0.0, 1.0], [0.5, 1.0], [0.9, 1.0], [0.1, 0.0], [0.1, 0.5], [0.1, 1.0]])
+    done = np.ones((7, 1), bool)
+    curves = sweeps(Evaluations(("a", "b"), values, np.zeros(7, np.int32), {}, done))
+    assert [curve.rows.tolist() for curve in curves] == [[1, 6, 2, 3], [4, 5, 6, 0]]
+
+
+def test_random_candidates_are_no_sweep():
+    values = np.random.default_rng(0).random((9, 3))
+    assert sweeps(Evaluations(PARAMETERS, values, np.zeros(9, np.int32), {}, np.ones((9, 1), bool))) == []
+
+
+def test_sweeps_have_a_row_a_parameter_and_a_column_an_objective_with_intervals(training):
+    figure = sweep_figure(GOALS, training, sweeps(training))
+    assert [across for across, _ in labels(figure)] == ["clearance"] * 4
+    assert [up for _, up in labels(figure)] == ["success rate [%]", "length ratio", "breaking points", "danger points"]
+    for ax in figure.axes:
+        (curve, default) = ax.lines
+        (band,) = ax.collections
+        low, high = band.get_datalim(ax.transData).intervaly
+        assert low < curve.get_ydata().min()
+        assert high > curve.get_ydata().max()
+        assert default.get_xdata()[0] == 0.1
+
+
+def test_hypervolume_holds_its_value_until_the_next_generation():
+    ax = new_figure((4, 3)).subplots()
+    hypervolume_figure(findings().hypervolume, ax)
+    assert ax.lines[0].get_drawstyle() == "steps-post"
+    np.testing.assert_array_equal(ax.lines[0].get_xydata(), [[40, 0.1], [160, 0.25], [300, 0.4]])
+
+
+def test_importance_is_written_in_percent_into_every_cell():
+    ax = importance_figure(findings()).axes[0]
+    assert [text.get_text() for text in ax.texts] == [
+        "50",
+        "80",
+        "10",
+        "90",
+        "10",
+        "5",
+        "20",
+        "0",
+        "20",
+        "10",
+        "5",
+        "2",
+    ]
+
+
+def test_optimism_shows_training_against_held_out():
+    found = findings()
+    figure = optimism_figure(found)
+    assert len(figure.axes) == 4
+    success = figure.axes[0]
+    assert success.get_xlabel() == "training: success rate [%], more is better"
+    containers = {container.get_label(): container for container in success.containers}
+    default = found.default
+    np.testing.assert_allclose(
+        containers["default constants"].lines[0].get_xydata(),
+        [[100 * default.training.success.value, 100 * default.held_out.success.value]],
+    )
+
+
+def test_agreement_has_a_place_a_start():
+    ax = agreement_figure(agreement(3)).axes[0]
+    assert [tick.get_text() for tick in ax.get_xticklabels()] == ["1", "2", "3"]
+    (signs,) = [line for line in ax.lines if line.get_label() == "share of signs that agree"]
+    np.testing.assert_allclose(signs.get_ydata(), 2 / 3)
+
+
+def test_what_is_not_known_is_drawn_as_nothing_rather_than_refused():
+    found = findings(held_out=False)
+    nan = np.full_like(found.importance, np.nan)
+    figure = importance_figure(type(found)(**vars(found) | {"importance": nan}))
+    assert {text.get_text() for text in figure.axes[0].texts} == {"–"}
+    assert isinstance(optimism_figure(found), Figure)

@@ -1,0 +1,87 @@
+"""The worst scenarios of one planner, each with a picture and a sentence that says why it failed."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from adwa_jax.presets import Preset
+from scenarios.drawing import FONT, legend_below, new_figure
+from scenarios.suite import Suite
+from tuning.evaluations import Evaluations
+from tuning.figures import drive_figure, drive_sentence
+from tuning.gallery import SECONDS, Cause, cause_by_result, turned_back
+from tuning.last_seconds import draw_last_seconds
+from tuning.outputs import save_figure
+from tuning.replay import Replay, replay
+from tuning.results import Results
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+class FailurePicture(NamedTuple):
+    """One scenario, drawn."""
+
+    path: Path
+    caption: str
+
+
+def failure_pictures(suite: Suite, preset: Preset, results: Results, folder: Path, limit: int = 6,
+                     y_down: bool = False) -> tuple[FailurePicture, ...]:
+    """Drive the worst scenarios again and write a picture of each to the folder.
+
+    results: of the suite under the preset. Failures come first, of every outcome one before a second of any; where
+    there are fewer than `limit`, the longest detours among the successes follow.
+    """
+    return tuple(_pictured(suite, preset, results, index, folder, y_down) for index in worst(results)[:limit])
+
+
+def results_of(evaluations: Evaluations, row: int, suite: Suite) -> Results:
+    """What one candidate that has seen all scenarios of the suite did, in the form of an evaluation."""
+    columns = {name: values[row] for name, values in evaluations.columns.items()}
+    return Results(suite.name, suite.names, columns.pop("outcome"), columns)
+
+
+def worst(results: Results) -> list[int]:
+    """All scenarios by index, worst first."""
+    seen: dict[int, int] = {}
+    turn = []
+    for index in np.flatnonzero(~results.reached).tolist():
+        outcome = int(results.outcome[index])
+        turn.append((seen.get(outcome, 0), index))
+        seen[outcome] = seen.get(outcome, 0) + 1
+    successes = np.flatnonzero(results.reached)
+    detours = successes[np.argsort(-results.measures["length_ratio"][successes], kind="stable")]
+    return [index for _, index in sorted(turn)] + detours.tolist()
+
+
+def _pictured(suite: Suite, preset: Preset, results: Results, index: int, folder: Path, y_down: bool) -> FailurePicture:
+    driven, name = replay(suite.scenarios[index], preset), suite.names[index]
+    if results.reached[index]:
+        caption = f"{name}: a success, but {results.measures['length_ratio'][index]:.2f} times the shortest grid path."
+        path = save_figure(lambda: _whole_drive(driven, name, y_down), folder / f"scenario_{index}.png")
+        return FailurePicture(path, caption)
+    cause = cause_by_result(results, index) or (Cause.TURNED if turned_back(driven) else Cause.MOVING)
+    path = save_figure(lambda: _last_seconds(driven, name, y_down), folder / f"scenario_{index}.png")
+    return FailurePicture(path, f"{name}: {cause.heading.lower()}. {cause.sentence}")
+
+
+def _whole_drive(driven: Replay, name: str, y_down: bool) -> "Figure":
+    return drive_figure(driven.scenario, driven.plan, driven.episode, driven.trace, title=name, y_down=y_down,
+                        robot=driven.robot)  # fmt: skip
+
+
+def _last_seconds(driven: Replay, name: str, y_down: bool) -> "Figure":
+    figure = new_figure((5.0, 6.0))
+    ax = figure.subplots()
+    title = f"{name}: {drive_sentence(driven.plan, driven.episode)}"
+    shaded = draw_last_seconds(driven, ax, SECONDS, title, y_down)
+    ax.set_xlabel("x [m]", fontsize=FONT)
+    ax.set_ylabel("y [m]", fontsize=FONT)
+    legend_below(ax)
+    if shaded is not None:
+        bar = figure.colorbar(shaded, ax=ax, shrink=0.6, pad=0.02)
+        bar.set_label("time before the end [s]", fontsize=FONT)
+        bar.ax.tick_params(labelsize=FONT - 1)
+    return figure

@@ -1,0 +1,351 @@
+"""The pictures of a tuning job's report: front, parallel coordinates, sweeps, hypervolume, importance, optimism gap,
+gradient agreement.
+
+Findings in, matplotlib figures out. Conventions: `scenarios.drawing`. Where a figure has one panel, `ax` may be given.
+Dimension letters: D parameters; O objectives; W candidates; G generations; S starts of the gradient method.
+"""
+
+from collections.abc import Mapping, Sequence
+from itertools import combinations
+from math import ceil
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from scenarios.drawing import (
+    BLACK,
+    BLUE,
+    CELL_LINES,
+    FONT,
+    ORANGE,
+    SKY,
+    VERMILLION,
+    figure_legend,
+    figure_of,
+    new_figure,
+)
+from tuning.analysis import judgement
+from tuning.console import UNITS
+from tuning.evaluations import Evaluations
+from tuning.findings import Findings, HypervolumeCurve, Judgement, Member
+from tuning.objectives import RATES, Goals, Statistic, estimate
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+COLUMNS = 3  # panels side by side
+GREY = "#999999"
+COLOURS = "cividis"  # equal steps in lightness: also for the colour-blind, and in grey
+SEED = 0  # of the resamples behind the intervals of a sweep
+DEFAULT = {"marker": "s", "markersize": 7, "color": BLACK}
+FRONT = {"marker": "o", "markersize": 5, "color": BLUE}
+CHOSEN = {"marker": "*", "markersize": 13, "color": VERMILLION, "markeredgecolor": BLACK}
+
+
+def recommended(findings: Findings) -> Member:
+    """The member that the job recommends."""
+    return findings.front[findings.choices[findings.recommended].member]
+
+
+def measure_name(statistic: Statistic) -> str:
+    """For people: without underscores, a rate as a rate."""
+    name = statistic.label.replace("_", " ")
+    return name.replace(statistic.measure, f"{statistic.measure} rate", 1) if statistic.measure in RATES else name
+
+
+def axis_label(statistic: Statistic) -> str:
+    """Name, unit, and which way is better."""
+    return f"{name_and_unit(statistic)}, {'less' if statistic.direction == 'min' else 'more'} is better"
+
+
+def name_and_unit(statistic: Statistic) -> str:
+    """For axes and headings."""
+    unit = unit_of(statistic)
+    return measure_name(statistic) + (f" [{unit}]" if unit else "")
+
+
+def unit_of(statistic: Statistic) -> str:
+    """Of `in_units`."""
+    return "%" if statistic.measure in RATES else UNITS.get(statistic.measure, "")
+
+
+def in_units(statistic: Statistic, value: Any) -> Any:
+    """A rate in percent, all else as it is; never −0."""
+    return (100.0 if statistic.measure in RATES else 1.0) * np.asarray(value, np.float64) + 0.0
+
+
+def front_figure(findings: Findings, training: Evaluations | None = None) -> "Figure":
+    """Every pair of objectives: the front, the default constants and the recommended ones, a line from each to its
+    value on the held-out suite; all candidates in grey if `training` is given. One objective: by candidate.
+    """
+    objectives = findings.goals.objectives
+    if len(objectives) == 1:
+        return _single_objective(findings, training)
+    pairs = list(combinations(range(len(objectives)), 2))
+    figure, panels = _panels(len(pairs), height=3.0)
+    cloud = candidate_objectives(findings.goals, training) if training is not None else None
+    for ax, (across, up) in zip(panels, pairs, strict=True):
+        if cloud is not None:
+            ax.plot(cloud[:, across], cloud[:, up], linestyle="none", marker=".", markersize=4, color=GREY, zorder=1,
+                    label="candidate")  # fmt: skip
+        _draw_members(findings, across, up, ax)
+        _label_axes(ax, axis_label(objectives[across]), axis_label(objectives[up]))
+        _show_members(findings, across, up, ax)
+    figure_legend(figure, panels)
+    return figure
+
+
+def parallel_figure(findings: Findings, ax: "Axes | None" = None) -> "Figure":
+    """Parallel coordinates: one line a member of the front through its constants and its objectives on training.
+
+    Each axis runs over what is shown; the shade is the first objective.
+    """
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+
+    objectives, members = findings.goals.objectives, [*findings.front, findings.default]
+    table = np.array([[*member.values, *(float(in_units(statistic, part.value)) for statistic, part in
+                                         zip(objectives, member.training.objectives, strict=True))]
+                      for member in members])  # fmt: skip
+    names = [*(name.replace("_", " ") for name in findings.parameters), *map(measure_name, objectives)]
+    if ax is None:
+        ax = new_figure((max(0.62 * len(names) + 1.6, 5.0), 4.6)).subplots()
+    low, high = np.nanmin(table, axis=0), np.nanmax(table, axis=0)
+    lines = np.where(high > low, (table - low) / np.where(high > low, high - low, 1.0), 0.5)
+    first = table[:, len(findings.parameters)]
+    shades = ScalarMappable(Normalize(np.nanmin(first), np.nanmax(first)), COLOURS)
+    for line, value in zip(lines[:-1], first[:-1], strict=True):
+        ax.plot(line, color=shades.to_rgba(value), linewidth=1.2, alpha=0.8, zorder=2)
+    ax.plot(lines[-1], color=BLACK, linewidth=1.8, linestyle="--", zorder=3, label="default constants")
+    best = lines[findings.choices[findings.recommended].member]
+    style: dict[str, Any] = CHOSEN | {"markersize": 9}
+    ax.plot(best, linewidth=2.4, zorder=4, label="recommended", **style)
+    _dress_parallel(ax, names, low, high, len(findings.parameters))
+    bar = figure_of(ax).colorbar(shades, ax=ax, pad=0.01, shrink=0.8)
+    bar.set_label(axis_label(objectives[0]), fontsize=FONT)
+    bar.ax.tick_params(labelsize=FONT - 1)
+    figure_legend(figure_of(ax), [ax])
+    return figure_of(ax)
+
+
+class Sweep(NamedTuple):
+    """Candidates in which one parameter varies and no other."""
+
+    parameter: int  # index
+    rows: np.ndarray  # of the evaluations, lowest value first
+
+
+def sweeps(training: Evaluations, fewest: int = 3) -> list[Sweep]:
+    """The curves of §3.4 that there are, with `fewest` candidates or more each, whichever method asked for them.
+
+    The others are fixed at the default, or at the end of the searched range that is nearest to it.
+    """
+    values = training.values[training.complete]
+    rows = np.flatnonzero(training.complete)
+    searched = values[1:] if len(values) > 1 else values
+    fixed = np.clip(training.values[0], searched.min(axis=0), searched.max(axis=0))
+    differs = ~np.isclose(values, fixed, rtol=1e-9, atol=1e-12)
+    found = []
+    for index in range(values.shape[1]):
+        alone = np.flatnonzero(~np.delete(differs, index, axis=1).any(axis=1))
+        if len(alone) >= fewest:
+            found.append(Sweep(index, rows[alone[np.argsort(values[alone, index], kind="stable")]]))
+    return found
+
+
+def sweep_figure(goals: Goals, training: Evaluations, found: Sequence[Sweep]) -> "Figure":
+    """§3.4: each parameter in turn (down) against each objective (across), with 95 % intervals; default dashed."""
+    columns, rows = len(goals.objectives), len(found)
+    figure = new_figure((2.5 * columns + 0.4, 2.0 * rows + 0.5))
+    grid = figure.subplots(rows, columns, squeeze=False)
+    for line, sweep in zip(grid, found, strict=True):
+        place = training.values[sweep.rows, sweep.parameter]
+        judged = [judgement(training, int(row), goals, SEED).objectives for row in sweep.rows]
+        for ax, statistic, intervals in zip(line, goals.objectives, zip(*judged, strict=True), strict=True):
+            points = in_units(statistic, intervals)
+            ax.fill_between(place, points[:, 1], points[:, 2], color=SKY, alpha=0.4, linewidth=0)
+            ax.plot(place, points[:, 0], color=BLUE, marker="o", markersize=3, linewidth=1.4)
+            ax.axvline(training.values[0, sweep.parameter], color=BLACK, linestyle="--", linewidth=0.9)
+            name = training.parameters[sweep.parameter].replace("_", " ")
+            _label_axes(ax, name, name_and_unit(statistic))
+    return figure
+
+
+def hypervolume_figure(curve: HypervolumeCurve, ax: "Axes | None" = None) -> "Figure":
+    """Hypervolume against the episodes driven: it can only rise."""
+    if ax is None:
+        ax = new_figure((5.6, 3.2)).subplots()
+    ax.step(curve.episodes, curve.value, where="post", color=BLUE, linewidth=1.8)
+    ax.plot(curve.episodes, curve.value, linestyle="none", marker="o", markersize=3.5, color=BLUE)
+    ax.set_xlim(left=0.0)
+    _label_axes(ax, "episodes driven", "hypervolume of the front")
+    return figure_of(ax)
+
+
+def importance_figure(findings: Findings, ax: "Axes | None" = None) -> "Figure":
+    """Heat map: share [%] of each objective's variation that each parameter explains by itself."""
+    share, objectives = 100.0 * findings.importance, findings.goals.objectives
+    if ax is None:
+        ax = new_figure((1.35 * len(objectives) + 2.6, 0.34 * len(share) + 1.5)).subplots()
+    image = ax.imshow(share, cmap=COLOURS, vmin=0.0, vmax=100.0, aspect="auto")
+    for (row, column), value in np.ndenumerate(share):
+        text = "–" if np.isnan(value) else f"{value:.0f}"
+        ax.text(column, row, text, ha="center", va="center", fontsize=FONT, color=BLACK if value > 55 else "white")
+    ax.set_xticks(range(len(objectives)), [measure_name(statistic).replace(" ", "\n", 1) for statistic in objectives])
+    ax.set_yticks(range(len(share)), [name.replace("_", " ") for name in findings.parameters])
+    ax.tick_params(labelsize=FONT, length=0)
+    bar = figure_of(ax).colorbar(image, ax=ax, pad=0.02)
+    bar.set_label("share of the variation [%]", fontsize=FONT)
+    bar.ax.tick_params(labelsize=FONT - 1)
+    return figure_of(ax)
+
+
+def optimism_figure(findings: Findings) -> "Figure":
+    """Training against held-out, a panel an objective, with 95 % intervals: on the dashed line both are equal."""
+    objectives = findings.goals.objectives
+    figure, panels = _panels(len(objectives), height=3.1, columns=min(len(objectives), 2))
+    best = recommended(findings)
+    for index, (ax, statistic) in enumerate(zip(panels, objectives, strict=True)):
+        others = [member for member in findings.front if member is not best]
+        _draw_against(others, index, statistic, ax, FRONT | {"label": "front"})
+        _draw_against([findings.default], index, statistic, ax, DEFAULT | {"label": "default constants"})
+        _draw_against([best], index, statistic, ax, CHOSEN | {"label": "recommended"})
+        ends = np.array([*ax.get_xlim(), *ax.get_ylim()])
+        ax.axline((ends.min(), ends.min()), slope=1.0, color=GREY, linestyle="--", linewidth=1.0, zorder=0)
+        _label_axes(ax, f"training: {axis_label(statistic)}", f"held-out: {name_and_unit(statistic)}")
+    figure_legend(figure, panels)
+    return figure
+
+
+def agreement_figure(agreement: Mapping[str, np.ndarray], ax: "Axes | None" = None) -> "Figure":
+    """Cosine between the surrogate's gradient and the hard planner's at each start, with its 95 % interval, and the
+    share of parameters whose signs agree. cosine, cosine_low, cosine_high, sign_agreement: [S].
+    """
+    if ax is None:
+        ax = new_figure((6.2, 3.2)).subplots()
+    cosine, low, high, signs = (np.atleast_1d(agreement[name]) for name in
+                                ("cosine", "cosine_low", "cosine_high", "sign_agreement"))  # fmt: skip
+    place = np.arange(len(cosine))
+    ax.errorbar(place - 0.1, cosine, np.maximum([cosine - low, high - cosine], 0.0), fmt="o", color=BLUE, capsize=3,
+                label="cosine, 95 % interval")  # fmt: skip
+    ax.plot(place + 0.1, signs, linestyle="none", marker="D", markersize=6, markerfacecolor=ORANGE,
+            markeredgecolor=BLACK, label="share of signs that agree")  # fmt: skip
+    ax.axhline(0.0, color=BLACK, linewidth=0.8, linestyle="--")
+    ax.set(ylim=(-1.05, 1.05), xlim=(-0.5, len(cosine) - 0.5))
+    _label_axes(ax, "start", "agreement")
+    ax.set_xticks(place, [str(index + 1) for index in place])
+    figure_legend(figure_of(ax), [ax])
+    return figure_of(ax)
+
+
+def candidate_objectives(goals: Goals, evaluations: Evaluations) -> np.ndarray:
+    """[W', O] objectives, in units as shown, of those candidates that have seen all scenarios."""
+    whole = evaluations.rows(evaluations.complete)
+    return np.stack([in_units(statistic, estimate(statistic, whole.columns, whole.done))
+                     for statistic in goals.objectives], axis=1)  # fmt: skip
+
+
+def _panels(count: int, height: float, columns: int = COLUMNS) -> tuple["Figure", list[Any]]:
+    """`count` axes; what is left of the last row is empty."""
+    columns = min(count, columns)
+    rows = ceil(count / columns)
+    figure = new_figure((3.2 * columns + 0.3, height * rows + 0.5))
+    panels = figure.subplots(rows, columns, squeeze=False).ravel().tolist()
+    for spare in panels[count:]:
+        spare.set_axis_off()
+    return figure, panels[:count]
+
+
+def _draw_members(findings: Findings, across: int, up: int, ax: "Axes") -> None:
+    statistics = findings.goals.objectives[across], findings.goals.objectives[up]
+    best = recommended(findings)
+    for kind, members, style in (("front", findings.front, FRONT), ("default constants", [findings.default], DEFAULT),
+                                 ("recommended", [best], CHOSEN)):  # fmt: skip
+        points = np.array([_point(member.training, across, up, statistics) for member in members])
+        ax.plot(*points.T, linestyle="none", zorder=4 if kind == "front" else 5, label=kind, **style)
+        for member, point in zip(members, points, strict=True):
+            if member.held_out is not None:
+                _draw_held_out(point, _point(member.held_out, across, up, statistics), style["color"], kind, ax)
+
+
+def _draw_held_out(trained: np.ndarray, held_out: np.ndarray, color: str, kind: str, ax: "Axes") -> None:
+    """A hollow mark, joined to the training value; faint for the front, of which there are many."""
+    faint = 0.35 if kind == "front" else 1.0
+    ax.plot(*np.stack([trained, held_out]).T, color=color, linewidth=0.9, alpha=faint, zorder=3)
+    ax.plot(*held_out[:, None], linestyle="none", marker="o", markersize=5, markerfacecolor="white",
+            markeredgecolor=color, alpha=max(faint, 0.6), zorder=3.5, label="the same, held out")
+
+
+def _point(judgement: Judgement, across: int, up: int, statistics: tuple[Statistic, Statistic]) -> np.ndarray:
+    return np.array([float(in_units(statistic, judgement.objectives[index].value))
+                     for statistic, index in zip(statistics, (across, up), strict=True)])  # fmt: skip
+
+
+def _show_members(findings: Findings, across: int, up: int, ax: "Axes") -> None:
+    """Zoom to the members: candidates far off would press them into a corner."""
+    statistics = findings.goals.objectives[across], findings.goals.objectives[up]
+    judgements = [judged for member in (*findings.front, findings.default)
+                  for judged in (member.training, member.held_out) if judged is not None]  # fmt: skip
+    points = np.array([_point(judged, across, up, statistics) for judged in judgements])
+    for (low, high), limits in zip(zip(np.nanmin(points, axis=0), np.nanmax(points, axis=0), strict=True),
+                                   (ax.set_xlim, ax.set_ylim), strict=True):  # fmt: skip
+        room = 0.12 * (high - low) or 0.02 * abs(high) or 1.0
+        limits(low - room, high + room)
+
+
+def _single_objective(findings: Findings, training: Evaluations | None) -> "Figure":
+    """The only objective of every candidate in the order in which they were asked for."""
+    ax = new_figure((5.6, 3.4)).subplots()
+    (statistic,) = findings.goals.objectives
+    if training is not None:
+        cloud = candidate_objectives(findings.goals, training)
+        ax.plot(np.flatnonzero(training.complete), cloud[:, 0], linestyle="none", marker=".", color=GREY,
+                label="candidate")  # fmt: skip
+    for member, style, kind in ((findings.default, DEFAULT, "default constants"),
+                                (recommended(findings), CHOSEN, "recommended")):  # fmt: skip
+        value = float(in_units(statistic, member.training.objectives[0].value))
+        ax.plot(member.row, value, linestyle="none", label=kind, **style)
+        if member.held_out is not None:
+            held_out = float(in_units(statistic, member.held_out.objectives[0].value))
+            ends = np.array([member.row, value]), np.array([member.row, held_out])
+            _draw_held_out(*ends, style["color"], kind, ax)
+    _label_axes(ax, "candidate, in the order asked for", axis_label(statistic))
+    figure_legend(figure_of(ax), [ax])
+    return figure_of(ax)
+
+
+def _draw_against(members: Sequence[Member], index: int, statistic: Statistic, ax: "Axes",
+                  style: dict[str, Any]) -> None:
+    """Held-out over training, with both intervals."""
+    judged = [(member.training, member.held_out) for member in members if member.held_out is not None]
+    if not judged:
+        return
+    training, held_out = (in_units(statistic, [part.objectives[index] for part in parts]).T
+                          for parts in zip(*judged, strict=True))  # fmt: skip
+    spread = [np.maximum([part[0] - part[1], part[2] - part[0]], 0.0) for part in (training, held_out)]
+    ax.errorbar(training[0], held_out[0], spread[1], spread[0], linestyle="none", elinewidth=0.7, **style)
+
+
+def _dress_parallel(ax: "Axes", names: Sequence[str], low: np.ndarray, high: np.ndarray, parameters: int) -> None:
+    """Axes with their ends written at them; a gap of shade tells constants from objectives."""
+    for place in range(len(names)):
+        ax.axvline(place, color=CELL_LINES, linewidth=1.0, zorder=0)
+        ax.text(place, 1.03, f"{high[place]:.3g}", ha="center", va="bottom", fontsize=FONT - 1)
+        ax.text(place, -0.03, f"{low[place]:.3g}", ha="center", va="top", fontsize=FONT - 1)
+    ax.axvspan(parameters - 0.5, len(names) - 0.5, color=CELL_LINES, alpha=0.45, zorder=-1, label="objectives")
+    ax.set_xticks(range(len(names)), names, rotation=40, ha="right", fontsize=FONT)
+    ax.set(yticks=[], xlim=(-0.5, len(names) - 0.5), ylim=(-0.1, 1.1))
+    for side in ("top", "right", "left"):
+        ax.spines[side].set_visible(False)
+
+
+def _label_axes(ax: "Axes", across: str, up: str) -> None:
+    from matplotlib.ticker import MaxNLocator
+
+    ax.set_xlabel(across, fontsize=FONT)
+    ax.set_ylabel(up, fontsize=FONT)
+    ax.tick_params(labelsize=FONT - 1)
+    ax.xaxis.set_major_locator(MaxNLocator(nbins=5))
+    ax.grid(color=CELL_LINES, linewidth=0.5)
+    ax.set_axisbelow(True)

@@ -1,0 +1,116 @@
+"""The front as a plot that answers to the mouse: its axes can be chosen, a point shows its constants.
+
+Needs plotly, the `report` extra; all of it is inlined, so that the page works offline.
+"""
+
+import json
+from html import escape
+from importlib.util import find_spec
+from typing import Any
+
+import numpy as np
+
+from scenarios.drawing import BLACK, BLUE, ORANGE, VERMILLION
+from tuning.evaluations import Evaluations
+from tuning.findings import Findings, Judgement, Member
+from tuning.objectives import Goals
+from tuning.report_figures import GREY, axis_label, candidate_objectives, in_units, measure_name, recommended, unit_of
+
+PLACE = "front-plot"  # id of the plot's element
+
+
+def available() -> bool:
+    """Whether plotly is installed."""
+    return find_spec("plotly") is not None
+
+
+def interactive_front(findings: Findings, training: Evaluations) -> tuple[str, str]:
+    """The plot's element, and the scripts that fill it, which belong to the end of the page."""
+    from plotly.offline import get_plotlyjs
+
+    figure = _figure(findings, training).to_json().replace("<", "\\u003c")  # no tag ends the script
+    element = f'<div class="plot" id="{PLACE}" role="img" aria-label="Interactive scatter plot of the front"></div>'
+    fill = f'{{ const figure = {figure}; Plotly.newPlot("{PLACE}", figure.data, figure.layout, {json.dumps(CONFIG)}) }}'
+    return element, f"<script>{get_plotlyjs()}</script>\n<script>{fill}</script>"
+
+
+CONFIG = {"displaylogo": False, "responsive": True, "modeBarButtonsToRemove": ["lasso2d", "select2d"]}
+
+
+def _figure(findings: Findings, training: Evaluations) -> Any:
+    import plotly.graph_objects as go
+
+    traces = _traces(findings, training)
+    up = min(1, len(findings.goals.objectives) - 1)
+    figure = go.Figure([_scatter(name, points, texts, style, up) for name, points, texts, style in traces])
+    labels = [axis_label(statistic) for statistic in findings.goals.objectives]
+    figure.update_layout(
+        template="plotly_white", height=520, margin={"l": 60, "r": 20, "t": 70, "b": 60}, hovermode="closest",
+        paper_bgcolor="white", legend={"orientation": "h", "y": -0.16}, hoverlabel={"align": "left"},
+        xaxis_title=labels[0], yaxis_title=labels[up],
+        updatemenus=[_menu("x", labels, traces, 0, 0.0), _menu("y", labels, traces, up, 0.5)],
+    )  # fmt: skip
+    return figure
+
+
+def _traces(findings: Findings, training: Evaluations) -> list[tuple[str, np.ndarray, list[str], dict[str, Any]]]:
+    """Name, points [N, O], texts N and style of each kind of candidate."""
+    goals, best = findings.goals, recommended(findings)
+    whole = training.values[training.complete]
+    cloud = candidate_objectives(goals, training)
+    kinds = [("candidates", cloud, [_constants(findings, values) for values in whole],
+              {"color": GREY, "size": 5, "symbol": "circle"})]  # fmt: skip
+    for name, members, style in (
+        ("front", findings.front, {"color": BLUE, "size": 10, "symbol": "circle"}),
+        ("default constants", [findings.default], {"color": BLACK, "size": 11, "symbol": "square"}),
+        ("recommended", [best], {"color": VERMILLION, "size": 17, "symbol": "star"}),
+    ):
+        kinds.append((name, _points(goals, [member.training for member in members]),
+                      [_member_text(findings, member) for member in members], style))  # fmt: skip
+    unseen = [member for member in (*findings.front, findings.default) if member.held_out is not None]
+    if unseen:
+        kinds.append(("held out", _points(goals, [member.held_out for member in unseen if member.held_out is not None]),
+                      [_member_text(findings, member) for member in unseen],
+                      {"color": ORANGE, "size": 9, "symbol": "circle-open"}))  # fmt: skip
+    return kinds
+
+
+def _points(goals: Goals, judgements: list[Judgement]) -> np.ndarray:
+    return np.array([[float(in_units(statistic, part.value))
+                      for statistic, part in zip(goals.objectives, judged.objectives, strict=True)]
+                     for judged in judgements])  # fmt: skip
+
+
+def _scatter(name: str, points: np.ndarray, texts: list[str], style: dict[str, Any], up: int) -> Any:
+    import plotly.graph_objects as go
+
+    return go.Scatter(x=_column(points, 0), y=_column(points, up), mode="markers", name=name, text=texts, marker=style,
+                      hovertemplate=f"<b>{name}</b><br>%{{text}}<extra></extra>")  # fmt: skip
+
+
+def _menu(axis: str, labels: list[str], traces: list[Any], active: int, place: float) -> dict[str, Any]:
+    """A list of objectives for one axis."""
+    buttons = [{"label": f"{axis}: {label}", "method": "update",
+                "args": [{axis: [_column(points, index) for _, points, _, _ in traces]},
+                         {f"{axis}axis.title.text": label}]}
+               for index, label in enumerate(labels)]  # fmt: skip
+    return {"buttons": buttons, "active": active, "x": place, "xanchor": "left", "y": 1.14, "yanchor": "top"}
+
+
+def _column(points: np.ndarray, index: int) -> list[float | None]:
+    """JSON has no NaN."""
+    return [float(value) if np.isfinite(value) else None for value in points[:, index]]
+
+
+def _member_text(findings: Findings, member: Member) -> str:
+    lines = []
+    for index, statistic in enumerate(findings.goals.objectives):
+        parts = [("training", member.training), ("held out", member.held_out)]
+        shown = [f"{float(in_units(statistic, judged.objectives[index].value)):.4g}{unit_of(statistic)} {suite}"
+                 for suite, judged in parts if judged is not None]  # fmt: skip
+        lines.append(f"{escape(measure_name(statistic))}: {', '.join(shown)}")
+    return "<br>".join(lines) + "<br>" + _constants(findings, member.values)
+
+
+def _constants(findings: Findings, values: np.ndarray) -> str:
+    return "<br>".join(f"{escape(name)} = {value:.4g}" for name, value in zip(findings.parameters, values, strict=True))
