@@ -24,7 +24,7 @@ from scenarios.drawing import (
     figure_of,
     new_figure,
 )
-from tuning.analysis import judgement
+from tuning.analysis import judgements
 from tuning.console import UNITS
 from tuning.evaluations import Evaluations
 from tuning.findings import Findings, HypervolumeCurve, Judgement, Member
@@ -161,7 +161,7 @@ def sweep_figure(goals: Goals, training: Evaluations, found: Sequence[Sweep]) ->
     grid = figure.subplots(rows, columns, squeeze=False)
     for line, sweep in zip(grid, found, strict=True):
         place = training.values[sweep.rows, sweep.parameter]
-        judged = [judgement(training, int(row), goals, SEED).objectives for row in sweep.rows]
+        judged = [one.objectives for one in judgements(training, sweep.rows.tolist(), goals, SEED)]
         for ax, statistic, intervals in zip(line, goals.objectives, zip(*judged, strict=True), strict=True):
             points = in_units(statistic, intervals)
             ax.fill_between(place, points[:, 1], points[:, 2], color=SKY, alpha=0.4, linewidth=0)

@@ -1,11 +1,12 @@
-"""A small job for tests, and stand-ins for what makes a job slow: a search without a library, a report of one line."""
+"""A small job for tests, cut into many small tiles and blocks, without the drawing of its report."""
 
 import sys
 from pathlib import Path
-from types import ModuleType
 
 import numpy as np
 
+import tuning.report
+from tuning import cli, conclude_job, store, tiled_judge
 from tuning.outputs import write_whole
 
 JOB = """\
@@ -13,28 +14,29 @@ name = "small"
 seed = 3
 
 [planner]
-preset = "extended"
+preset = "paper"
 
 [training]
 suites = [{suite = "paper-15", count = 5, seed = 1}]
 
 [held_out]
-suites = [{suite = "paper-15", count = 4, seed = 2}]
+suites = [{suite = "paper-15", count = 3, seed = 2}]
 
 [parameters.clearance]
 low = 0.02
 high = 0.5
 scale = "log"
 
-[parameters.progress]
+[parameters.velocity]
 low = 0.2
 high = 1.5
 
 [method]
-name = "sobol"
-episodes = 50
-generation = 4
+name = "nsga3"
+episodes = 65
+population = 4
 """
+CANDIDATES, SCENARIOS = 13, 5  # what the budget pays for, the default included
 
 
 def written(folder: Path, text: str = JOB) -> Path:
@@ -43,14 +45,36 @@ def written(folder: Path, text: str = JOB) -> Path:
     return path
 
 
-def short_report() -> None:
-    """Let the report be one line: drawing it is another module's business."""
-    stand_in = ModuleType("tuning.report")
+def short_report(folder, job, findings, training, held_out, held_out_rows, remembered, environment, gallery):
+    """Depends on all that a report is made of."""
+    totals = [float(np.sum(found.columns["length"], dtype=np.float64)) for found in (training, held_out) if found]
+    facts = job.name, len(findings.front), held_out_rows.tolist(), totals, sorted(remembered), environment["inputs"]
+    write_whole(folder / "report.html", f"{facts}\n")
+    return folder / "report.html"
 
-    def write_report(folder, job, findings, training, held_out, held_out_rows, remembered, environment, gallery):
-        line = f"{job.name} {len(findings.front)} {training.done.sum()} {held_out_rows.tolist()} {sorted(environment)}"
-        write_whole(folder / "report.html", line + f" {np.sum(training.columns['length'], dtype=np.float64)}\n")
-        return folder / "report.html"
 
-    stand_in.__dict__["write_report"] = write_report
-    sys.modules["tuning.report"] = stand_in
+def in_small_pieces(patch=setattr):
+    """patch: setattr, or that of a monkeypatch."""
+    patch(tuning.report, "write_report", short_report)
+    patch(conclude_job, "_gallery", lambda *_: ())
+    patch(store, "TILE_WIDTH", 2)
+    for name in ("FIRST_BLOCK", "SMALLEST_BLOCK", "LARGEST_BLOCK"):
+        patch(tiled_judge, name, 4)
+
+
+def results_of(folder: Path) -> dict[str, bytes]:
+    """Every file of a job that is a result, by its path."""
+    files = [path for path in sorted(folder.rglob("*")) if path.is_file() and path.name not in ("lock", "log.jsonl")]
+    return {str(path.relative_to(folder)): path.read_bytes() for path in files}
+
+
+def pairs_driven(events) -> list[tuple]:
+    """(suite, row, scenario) of every episode that the log says was driven, repeated if it was again."""
+    return [(event["suite"], row, scenario) for event in events if event["event"] == "block"
+            for row in event["rows"] for scenario in range(*event["scenarios"])]  # fmt: skip
+
+
+if __name__ == "__main__":  # the command, in a process of its own
+    in_small_pieces()
+    sys.argv[0] = "adwa"
+    cli.main()
