@@ -7,7 +7,7 @@ import tomllib
 from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
@@ -220,17 +220,18 @@ def _sentence(found: Mapping[str, Any], place: tuple[str, ...], known: tuple[str
 
 def _names_at(place: tuple[str | int, ...]) -> tuple[str, ...]:
     """Keys of the table at a place in the file."""
-    model: Any = Job
+    model: type[BaseModel] = Job
     for part in place:
-        if isinstance(model, type) and issubclass(model, BaseModel):
-            model = _ENTRIES.get((model, part)) or model.model_fields[str(part)].annotation
+        if part in model.model_fields:  # else the place in a list, or the name of an entry
+            model = _model_in(model.model_fields[str(part)].annotation)
     return tuple(model.model_fields)
 
 
-_ENTRIES: dict[tuple[type, str | int], type[BaseModel]] = {
-    (Job, "parameters"): ParameterTable, (Job, "objectives"): ObjectiveTable, (Job, "constraints"): ConstraintTable,
-    (SuitesTable, "suites"): SuiteTable,
-}  # fmt: skip
+def _model_in(annotation: Any) -> type[BaseModel]:
+    """The table of an annotation such as list[SuiteTable] | None."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    return next(_model_in(part) for part in get_args(annotation) if part not in (str, type(None)))
 
 
 def _remedy(value: str, names: Iterable[str], otherwise: str = "remove or rename it") -> str:
