@@ -25,11 +25,11 @@ from tuning.evaluations import Evaluations
 if TYPE_CHECKING:
     import xarray
 
-WHOLE = ("outcome", "hit_while_stopped", "brakings", "replans", "key_point_count", "expansions", "breaking_points",
+WHOLE = ("outcome", "brakings", "replans", "key_point_count", "expansions", "breaking_points",
          "danger_points", *(f"planned_{name}" for name in PlannedMeasures._fields))  # fmt: skip
 # Of the engine's columns, in its order.
 FIGURES: dict[str, type] = {
-    name: np.int32 if name in WHOLE else np.float32
+    name: np.bool_ if name == "hit_while_stopped" else np.int32 if name in WHOLE else np.float32
     for name in ("optimal_length", "planned_length", "key_point_length", "key_point_count", "expansions",
                  *(f"planned_{name}" for name in PlannedMeasures._fields), "outcome", "hit_while_stopped", "brakings",
                  "replans", *Measures._fields)

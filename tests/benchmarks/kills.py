@@ -25,7 +25,8 @@ def main(kills: int, seed: int = 0) -> None:
         _ended(started("run", file, "--out", whole))
         blocks = sum(event["event"] == "block" for event in events_of(whole))
         for kill in range(kills):
-            process = started(*(("resume", killed) if (killed / "job.toml").exists() else ("run", file, "--out", killed)))
+            begun = (killed / "job.toml").exists()
+            process = started(*(("resume", killed) if begun else ("run", file, "--out", killed)))
             if draw.random() < 0.8:
                 until_blocks(killed, round((kill + draw.random()) * blocks / kills), process)
             time.sleep(draw.random() * 0.3)
