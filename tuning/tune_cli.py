@@ -1,6 +1,8 @@
 """The commands `adwa tune`: check, run, resume, status, report."""
 
+import os
 import signal
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import timedelta
@@ -18,6 +20,7 @@ from tuning.outputs import check_folder
 tune_app = typer.Typer(help="Tune constants: jobs that go on after a kill and end in a report.")
 JobArgument = Annotated[Path, typer.Argument(metavar="JOB", help="The job file, TOML.")]
 FolderArgument = Annotated[Path, typer.Argument(metavar="DIR", help="The folder of a job.")]
+INTERRUPTED = 130  # exit code
 RECENT = 20  # blocks of episodes, by which speed is told
 
 
@@ -119,6 +122,8 @@ def _told_to_stop(folder: Path) -> Iterator[None]:
     except KeyboardInterrupt:
         if (folder / JOB).exists():
             note(f"adwa: stopped; what is done is kept; go on with: adwa tune resume {folder}")
-        raise
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(INTERRUPTED)  # a signal between two looks leaves threads at work, which the interpreter's end aborts
     finally:
         signal.signal(signal.SIGTERM, before)
