@@ -78,7 +78,8 @@ class TiledJudge:
         seconds = time.perf_counter() - began
         self._keep(judged, block, first, values)
         episodes = int(judged.done.sum())
-        self._log.write("block", suite=self._store.path.stem, rows=[int(first + place) for place in block.places],
+        event = "block" if judged.done.all() else "block cut short"  # of which whole tiles are kept
+        self._log.write(event, suite=self._store.path.stem, rows=[int(first + place) for place in block.places],
                         scenarios=[start, stop], episodes=episodes, seconds=round(seconds, 3))  # fmt: skip
         self.driven, self.engine_seconds = self.driven + episodes, self.engine_seconds + seconds
         if not judged.done.all():
