@@ -31,7 +31,7 @@ def test_the_first_example_is_short():
 def test_the_weights_example_is_the_paper_presets_constants(tmp_path):
     (example,) = re.findall(r"```toml\n(.*?)```", README, re.DOTALL)
     (tmp_path / "weights.toml").write_text(example)
-    assert load_weights(tmp_path / "weights.toml", paper().constants) == paper().constants
+    assert load_weights(tmp_path / "weights.toml", paper()) == paper()
 
 
 def test_kernels_run_as_they_stand_under_jit():

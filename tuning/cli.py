@@ -1,4 +1,4 @@
-"""The command `adwa`: plan, evaluate, ablate, weights, drive, suite make, suite show, claims, demo.
+"""The command `adwa`: plan, evaluate, ablate, weights, drive, suite make, suite show, tune, claims, demo.
 
 Exit code 0: done; 1: ran, but found nothing; 2: bad input, said in one line.
 """
@@ -19,6 +19,7 @@ import typer
 
 from adwa_jax.astar import Status
 from adwa_jax.episode import Outcome
+from adwa_jax.heuristic_weight import WeightRule
 from adwa_jax.presets import Preset
 from adwa_jax.rules import RULE_NAMES
 from scenarios.errors import InputError
@@ -57,7 +58,8 @@ from tuning.planning import PlannedPath, as_json, plan_paths, planner_constants,
 from tuning.results import Results
 from tuning.sources import Source, Work, options_named, read_grid, read_queries, read_suite
 from tuning.suite_files import KINDS, suite_in
-from tuning.weights_file import parse_weight_rule, weights_text
+from tuning.tune_cli import tune_app
+from tuning.weights_file import load_weight_rule, parse_weight_rule, weights_text
 
 app = typer.Typer(
     add_completion=False, pretty_exceptions_enable=False,
@@ -65,6 +67,7 @@ app = typer.Typer(
 )  # fmt: skip
 suite_app = typer.Typer(help="Write suites of scenarios to a file, and picture them.")
 app.add_typer(suite_app, name="suite")
+app.add_typer(tune_app, name="tune")
 
 FOUND_NOTHING, BAD_INPUT, INTERRUPTED = 1, 2, 130
 LARGEST_RADIUS = 1e6  # [m]
@@ -87,6 +90,7 @@ class ScopeName(StrEnum):
 
 @app.callback(invoke_without_command=True)
 @suite_app.callback(invoke_without_command=True)
+@tune_app.callback(invoke_without_command=True)
 def help_alone(context: typer.Context) -> None:
     """Without a command: how to give one."""
     if context.invoked_subcommand is None:
@@ -104,6 +108,7 @@ def plan_command(
     planner: PlannerName = PlannerName.improved,
     scope: ScopeName = ScopeName.node,
     weight_rule: Annotated[str | None, typer.Option(help="a,b,c,d: α, β, γ, δ of eq. 5.")] = None,
+    weights: Annotated[Path | None, typer.Option(help="TOML of constants; those of eq. 5 are taken.")] = None,
     robot_radius: Annotated[float, typer.Option(help="Obstacles are inflated by it, in metres.")] = 0.0,
     budget: Annotated[int | None, typer.Option(help="Expansions a search may take; default: as many as cells.")] = None,
     unknown: UnknownOption = UnknownPolicy.occupied,
@@ -115,7 +120,7 @@ def plan_command(
     """Plan paths on a known map."""
     _check_outputs(json_file, figure)
     _require_radius(robot_radius)
-    constants = planner_constants(parse_weight_rule(weight_rule) if weight_rule is not None else None, robot_radius)
+    constants = planner_constants(_weight_rule(weight_rule, weights), robot_radius)
     options = planner_options(planner.value, scope.value, _budget(budget))
     with options_named(resolution="--resolution"):
         map_file = load_map(map, resolution)
@@ -256,7 +261,7 @@ def weights_command(
 ) -> None:
     """Print a preset's constants as TOML, to change and to give back with --weights."""
     config = configured(preset, Vehicle(robot, v_max))
-    print(weights_text(config.constants, config.options.rules), end="")
+    print(weights_text(config), end="")
 
 
 @app.command("drive")
@@ -401,7 +406,8 @@ def main() -> None:
 
 
 def _fail(message: str) -> None:
-    print("adwa: " + " ".join(message.split()), file=sys.stderr)
+    for line in message.splitlines():
+        print("adwa: " + " ".join(line.split()), file=sys.stderr)
     sys.exit(BAD_INPUT)
 
 
@@ -455,6 +461,15 @@ def _sizes_refused(name: str) -> Iterator[None]:
     except OverflowError as error:
         raise InputError(f"{name}: too long ({error}); squared distances must fit 32-bit integers; crop the map or "
                          "coarsen its resolution") from error
+
+
+def _weight_rule(text: str | None, weights: Path | None) -> WeightRule | None:
+    """That of --weight-rule or of --weights; None: the preset's."""
+    if text is not None and weights is not None:
+        raise InputError(f"--weights: {weights}; cannot go with --weight-rule; leave out one or the other")
+    if weights is not None:
+        return load_weight_rule(weights)
+    return None if text is None else parse_weight_rule(text)
 
 
 def _budget(budget: int | None) -> int | None:

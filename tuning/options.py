@@ -83,9 +83,7 @@ def configured(preset: str, vehicle: Vehicle, weights: Path | None = None) -> Pr
     if preset not in PRESETS:
         raise InputError(f"--preset: {preset!r}; the presets are {', '.join(PRESETS)}; choose one of them")
     config = vehicle.driving(PRESETS[preset]())
-    if weights is None:
-        return config
-    return config._replace(constants=load_weights(weights, config.constants, config.options.rules))
+    return config if weights is None else load_weights(weights, config)
 
 
 def require_one_disc(option: str, config: Preset) -> None:

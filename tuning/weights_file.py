@@ -12,11 +12,13 @@
     sparse_ratio = 0.5         # may be left out
     clearance_cap = 0.5        # [m]; this and what follows may be left out
     contact_time = 1.5         # only with the rule that uses it
+    horizon_steps = 20         # static counts of the DWA, whole numbers; another value compiles anew
 
 A key that the preset's rules leave without effect is refused.
 """
 
 import tomllib
+from collections.abc import Mapping
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import TypeVar
@@ -24,8 +26,9 @@ from typing import TypeVar
 import jax
 import numpy as np
 
-from adwa_jax.constants import Behaviour, Constants
+from adwa_jax.constants import Behaviour
 from adwa_jax.heuristic_weight import WeightRule
+from adwa_jax.presets import Preset, paper
 from adwa_jax.rules import Rules
 from adwa_jax.score import ScoreWeights
 from scenarios.errors import InputError
@@ -35,8 +38,8 @@ SCORE = tuple(field.name for field in fields(ScoreWeights))
 RULE = tuple(field.name for field in fields(WeightRule))
 BEHAVIOUR = ("clearance_cap", "clearance_margin", "static_margin", "mover_margin", "mover_growth", "mover_cap",
              "lookahead", "route_margin")  # fmt: skip
-# Counts of `DwaOptions`: another value compiles anew.
-COUNTS = ("v_samples", "yaw_rate_samples", "horizon_steps")
+# Counts of `DwaOptions`, each with its range: another value compiles anew, and a decision's cost grows with all three.
+COUNTS = {"v_samples": (2, 101), "yaw_rate_samples": (2, 101), "horizon_steps": (1, 200)}
 OPTIONAL = ("dense_ratio", "sparse_ratio")
 REPLACED = ("velocity", "global_heading")  # by progress
 # What has an effect only with a rule.
@@ -45,35 +48,46 @@ NEEDS = {
     "forward": "reverse", "static_margin": "stopping", "mover_margin": "mover_margin", "mover_growth": "mover_margin",
     "mover_cap": "mover_terms", "lookahead": "carrot", "route_margin": "replan",
 }  # fmt: skip
-PAPER = Rules()  # none beyond it
 LARGEST = 1e6  # beyond it sums of weighted terms may leave float32
 Kind = TypeVar("Kind", ScoreWeights, WeightRule, Behaviour)
 
 
-def load_weights(path: Path, constants: Constants, rules: Rules = PAPER) -> Constants:
-    """`constants` with the file's values in place of theirs. InputError names the file, the key and the remedy."""
-    numbers = {key: _number(path, key, value) for key, value in _read(path).items()}
+def load_weights(path: Path, config: Preset) -> Preset:
+    """`config` with the file's values in place of its own. InputError names the file, the key and the remedy."""
+    constants, options = config
+    rules, numbers = options.rules, _numbers(path)
     for key in numbers:
         _require_effect(path, key, rules)
     if not rules.progress:
         _require(path, numbers, tuple(key for key in SCORE if in_use(key, rules) and key not in NEEDS))
-    if any(key in RULE for key in numbers):
-        _require(path, numbers, tuple(key for key in RULE if key not in OPTIONAL))
     made = replace(
         constants,
         weights=_replaced(path, constants.weights, numbers, SCORE),
-        weight_rule=_replaced(path, constants.weight_rule, numbers, RULE),
+        weight_rule=_rule(path, constants.weight_rule, numbers),
         behaviour=_replaced(path, constants.behaviour, numbers, BEHAVIOUR),
     )
     _require_a_weight(path, made.weights, rules)
-    return made
+    counts = {key: round(numbers[key]) for key in COUNTS if key in numbers}
+    return Preset(made, replace(options, dwa=replace(options.dwa, **counts)))
 
 
-def weights_text(constants: Constants, rules: Rules = PAPER) -> str:
-    """The TOML of every constant that has an effect, which `load_weights` reads back to the same values."""
+def load_weight_rule(path: Path) -> WeightRule:
+    """The constants of eq. 5 in a file of weights of any preset. InputError if it has none."""
+    numbers = _numbers(path)
+    if not any(key in RULE for key in numbers):
+        raise bad_input(path, "no constant of eq. 5", f"planning depends on {', '.join(RULE)}", "add them")
+    return _rule(path, paper().constants.weight_rule, numbers)
+
+
+def weights_text(config: Preset) -> str:
+    """The TOML of every constant that has an effect, counts included, which `load_weights` reads back to the same
+    values.
+    """
+    constants, options = config
     parts = ((constants.weights, SCORE), (constants.weight_rule, RULE), (constants.behaviour, BEHAVIOUR))
-    lines = [f"{key} = {_decimal(getattr(part, key))}" for part, keys in parts for key in keys if in_use(key, rules)]
-    return "\n".join(lines) + "\n"
+    lines = [f"{key} = {_decimal(getattr(part, key))}" for part, keys in parts for key in keys
+             if in_use(key, options.rules)]  # fmt: skip
+    return "\n".join([*lines, *(f"{key} = {getattr(options.dwa, key)}" for key in COUNTS)]) + "\n"
 
 
 def in_use(key: str, rules: Rules) -> bool:
@@ -106,13 +120,22 @@ def _read(path: Path) -> dict[str, object]:
                         "write lines such as: clearance = 0.4") from None
 
 
+def _numbers(path: Path) -> dict[str, float]:
+    return {key: _number(path, key, value) for key, value in _read(path).items()}
+
+
 def _number(path: Path, key: str, value: object) -> float:
-    known = SCORE + RULE + BEHAVIOUR
+    known = (*SCORE, *RULE, *BEHAVIOUR, *COUNTS)
     if key not in known:
         raise bad_input(path, f"{key}: unknown key", f"the keys are {', '.join(known)}", "remove or rename it")
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise bad_input(path, f"{key} = {shown(value)}", "must be a number", "write it without quotes or brackets")
-    if not 0.0 <= value <= LARGEST:  # NaN too
+    if key in COUNTS:
+        low, high = COUNTS[key]
+        if not (isinstance(value, int) and low <= value <= high):
+            raise bad_input(path, f"{key} = {shown(value)}", f"must be a whole number from {low} to {high}",
+                            "correct it")
+    elif not 0.0 <= value <= LARGEST:  # NaN too
         raise bad_input(path, f"{key} = {shown(value)}", f"must be a finite number from 0 to {LARGEST:g}", "correct it")
     return float(value)
 
@@ -127,7 +150,13 @@ def _require_effect(path: Path, key: str, rules: Rules) -> None:
                     "remove it, or choose --preset extended")
 
 
-def _require(path: Path, values: dict[str, float], keys: tuple[str, ...]) -> None:
+def _rule(path: Path, rule: WeightRule, numbers: dict[str, float]) -> WeightRule:
+    if any(key in RULE for key in numbers):
+        _require(path, numbers, tuple(key for key in RULE if key not in OPTIONAL))
+    return _replaced(path, rule, numbers, RULE)
+
+
+def _require(path: Path, values: Mapping[str, float], keys: tuple[str, ...]) -> None:
     missing = [key for key in keys if key not in values]
     if missing:
         raise bad_input(path, f"{', '.join(missing)}: missing", f"{', '.join(keys)} belong together",

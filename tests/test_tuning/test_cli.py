@@ -98,6 +98,7 @@ def write_images():
 
 def write_weights():
     toml("weights.toml", **WEIGHTS)
+    toml("rule.toml", **WEIGHTS, **RULE)
     toml("unknown.toml", **WEIGHTS, clearence=0.4)
     toml("missing.toml", **{key: value for key, value in WEIGHTS.items() if key != "velocity"})
     toml("nan.toml", **{**WEIGHTS, "clearance": "nan"})
@@ -227,6 +228,7 @@ class TestPlan:
     @pytest.mark.parametrize(("arguments", "cells"), [
         (("--planner", "traditional"), 8), (("--planner", "dijkstra"), 10), (("--scope", "start"), 10),
         (("--weight-rule", "0.25,0.5,1.25,0.5"), 10), (("--budget", "200"), 10),
+        (("--weights", "rule.toml"), 10),
     ])  # fmt: skip
     def test_options_of_the_planner(self, adwa, arguments, cells):
         code, out, _ = adwa(*PLAN, *arguments, "--json", "-")
@@ -495,6 +497,9 @@ MISTAKES = {
     "dense rule": ((*PLAN, "--weight-rule", "0.9,0.5,1.2,0.6"), "--weight-rule", "must be < 1", "lower dense_base"),
     "sparse rule": ((*PLAN, "--weight-rule", "0.5,0.5,0.9,0.6"), "--weight-rule", "0.9", "raise it"),
     "three constants": ((*PLAN, "--weight-rule", "1,2,3"), "--weight-rule", "'1,2,3'", "write for instance"),
+    "rule twice": ((*PLAN, "--weight-rule", "1,1,2,1", "--weights", "w.toml"), "--weights", "w.toml", "leave out"),
+    "weights without a rule": ((*PLAN, "--weights", "weights.toml"), "weights.toml", "no constant of eq. 5", "add"),
+    "weights of a bad rule": ((*PLAN, "--weights", "dense.toml"), "dense.toml", "must be < 1", "lower dense_base"),
     "empty rule": ((*PLAN, "--weight-rule", ""), "--weight-rule", "''", "write for instance"),
     # outputs
     "json is a folder": ((*PLAN, "--json", "worlds"), "--json", "worlds", "name a file in it"),

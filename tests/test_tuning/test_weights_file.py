@@ -3,12 +3,21 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
+from adwa_jax.constants import Options
 from adwa_jax.heuristic_weight import WeightRule
-from adwa_jax.presets import extended, paper, preset
+from adwa_jax.presets import Preset, extended, paper, preset
 from adwa_jax.rules import EVERY_RULE, Rules
 from adwa_jax.score import ScoreWeights
 from scenarios.errors import InputError
-from tuning.weights_file import NEEDS, in_use, load_weights, parse_weight_rule, weights_text
+from tuning.weights_file import (
+    COUNTS,
+    NEEDS,
+    in_use,
+    load_weight_rule,
+    load_weights,
+    parse_weight_rule,
+    weights_text,
+)
 
 SCORE = {"local_heading": 0.4, "clearance": 0.25, "velocity": 0.6, "global_heading": 0}
 RULE = {"dense_base": 0.5, "dense_gain": 0.5, "sparse_base": 1.25, "sparse_gain": 0.5}
@@ -26,7 +35,7 @@ def written(tmp_path):
 
 def refusal(path):
     with pytest.raises(InputError) as caught:
-        load_weights(path, paper().constants)
+        load_weights(path, paper())
     message = str(caught.value)
     assert message.startswith(str(path))
     assert "\n" not in message
@@ -34,16 +43,16 @@ def refusal(path):
 
 
 def test_score_weights_stand_in_for_the_presets_and_nothing_else_changes(written):
-    loaded = load_weights(written(**SCORE), paper().constants)
+    loaded = load_weights(written(**SCORE), paper()).constants
     assert loaded.weights == ScoreWeights(0.4, 0.25, 0.6, 0.0)
     assert (loaded.weight_rule, loaded.robot, loaded.behaviour) == (
         paper().constants.weight_rule, paper().constants.robot, paper().constants.behaviour)  # fmt: skip
 
 
 def test_the_rule_may_come_with_or_without_its_thresholds(written):
-    loaded = load_weights(written(**SCORE, **RULE), paper().constants)
+    loaded = load_weights(written(**SCORE, **RULE), paper()).constants
     assert loaded.weight_rule == WeightRule(0.5, 0.5, 1.25, 0.5, 1.5, 0.5)
-    loaded = load_weights(written(**SCORE, **RULE, dense_ratio=2, sparse_ratio=0.25), paper().constants)
+    loaded = load_weights(written(**SCORE, **RULE, dense_ratio=2, sparse_ratio=0.25), paper()).constants
     assert loaded.weight_rule == WeightRule(0.5, 0.5, 1.25, 0.5, 2.0, 0.25)
 
 
@@ -102,8 +111,7 @@ def test_what_is_not_toml_is_refused(tmp_path, content):
 
 
 def beyond_paper(written, rules, **values):
-    config = preset(rules)
-    return load_weights(written(**values), config.constants, rules)
+    return load_weights(written(**values), preset(rules)).constants
 
 
 def test_constants_of_the_rules_in_use_may_be_given_one_by_one(written):
@@ -114,7 +122,7 @@ def test_constants_of_the_rules_in_use_may_be_given_one_by_one(written):
 
 
 def test_distances_of_the_papers_method_may_be_given_too(written):
-    loaded = load_weights(written(**SCORE, clearance_cap=0.75, clearance_margin=0.5), paper().constants)
+    loaded = load_weights(written(**SCORE, clearance_cap=0.75, clearance_margin=0.5), paper()).constants
     assert (loaded.behaviour.clearance_cap, loaded.behaviour.clearance_margin) == (0.75, 0.5)
 
 
@@ -143,15 +151,40 @@ def test_a_distance_that_must_be_positive_is_refused(written):
 
 @pytest.mark.parametrize("rules", [Rules(), EVERY_RULE, Rules().only("reverse")])
 def test_what_is_written_is_read_back_to_the_same_numbers(tmp_path, rules):
-    constants = preset(rules).constants
+    constants, options = preset(rules)
     constants = replace(constants, weights=replace(constants.weights, clearance=1 / 3))
-    (tmp_path / "weights.toml").write_text(weights_text(constants, rules))
-    loaded = load_weights(tmp_path / "weights.toml", paper().constants, rules)
+    options = replace(options, dwa=replace(options.dwa, v_samples=7))
+    (tmp_path / "weights.toml").write_text(weights_text(Preset(constants, options)))
+    loaded, counts = load_weights(tmp_path / "weights.toml", Preset(paper().constants, Options(rules=rules)))
+    assert all(getattr(counts.dwa, name) == getattr(options.dwa, name) for name in COUNTS)
     for part in ("weights", "weight_rule", "behaviour"):
         for field in fields(getattr(constants, part)):
             if in_use(field.name, rules):
                 given, again = (np.float32(getattr(getattr(each, part), field.name)) for each in (constants, loaded))
                 assert given == again, field.name
+
+
+def test_counts_become_static_options(written):
+    loaded = load_weights(written(**SCORE, v_samples=7, horizon_steps=15), paper())
+    dwa = paper().options.dwa
+    assert loaded.options == replace(paper().options, dwa=replace(dwa, v_samples=7, horizon_steps=15))
+
+
+@pytest.mark.parametrize("value", ["1", "102", "7.0", "-3", "true", '"7"'])
+def test_a_count_that_is_none_is_refused(written, value):
+    message = refusal(written(**SCORE, v_samples=value))
+    assert message.startswith(f": v_samples = {value}".replace('"', "'").replace("true", "True"))
+
+
+@pytest.mark.parametrize("config", [paper(), extended()])
+def test_the_rule_of_any_presets_file_is_read(tmp_path, config):
+    (tmp_path / "weights.toml").write_text(weights_text(config).replace("dense_gain = 0.5", "dense_gain = 0.25"))
+    assert load_weight_rule(tmp_path / "weights.toml") == replace(paper().constants.weight_rule, dense_gain=0.25)
+
+
+def test_a_file_without_a_rule_has_none_to_read(written):
+    with pytest.raises(InputError, match=r"no constant of eq\. 5; .*; add them$"):
+        load_weight_rule(written(**SCORE))
 
 
 def test_a_file_that_is_not_there_and_a_folder_are_refused(tmp_path):

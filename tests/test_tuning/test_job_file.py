@@ -1,0 +1,153 @@
+"""Mistakes in job files: each named with its dotted path, all of them together, before anything runs."""
+
+import re
+
+import pytest
+
+from adwa_jax.presets import extended
+from scenarios.errors import InputError
+from scenarios.suite import make_suite, save_suite
+from tuning.job_checks import goals_of, planner_of, set_up, space_of
+from tuning.job_file import load_job
+from tuning.objectives import DEFAULT_OBJECTIVES, Constraint, Statistic
+
+JOB = """\
+name = "office"
+seed = 7
+
+[planner]
+preset = "extended"
+
+[training]
+suites = [{suite = "paper-15", count = 3, seed = 1}]
+
+[held_out]
+suites = [{suite = "paper-15", count = 2, seed = 2}]
+
+[parameters.clearance]
+low = 0.02
+high = 0.5
+scale = "log"
+
+[[constraints]]
+measure = "success"
+at_least = 0.95
+
+[method]
+name = "sobol"
+episodes = 30
+"""
+
+
+@pytest.fixture
+def written(tmp_path):
+    def write(*changes, text=JOB):
+        for before, after in changes:
+            assert before in text
+            text = text.replace(before, after, 1)
+        path = tmp_path / "job.toml"
+        path.write_text(text)
+        return path
+
+    return write
+
+
+def told(path):
+    """The mistakes, without the file's name."""
+    with pytest.raises(InputError) as caught:
+        load_job(path)
+    lines = str(caught.value).splitlines()
+    assert all(line.startswith(f"{path}: ") for line in lines)
+    return [line.removeprefix(f"{path}: ") for line in lines]
+
+
+def test_a_job_says_planner_space_goals_and_suites(written):
+    path = written()
+    job = load_job(path)
+    config = planner_of(job, path.parent)
+    assert config == extended()
+    assert space_of(job, config).names == ("clearance",)
+    goals = goals_of(job)
+    assert goals.objectives == DEFAULT_OBJECTIVES
+    assert goals.constraints == (Constraint(Statistic("success", "max"), 0.95),)
+    setup = set_up(job, path, path.parent, quiet=True)
+    assert (setup.training.names, len(setup.held_out.names)) == (make_suite("paper-15", 1, 3).names, 2)
+
+
+def test_several_suites_are_taken_together_under_different_names(written, tmp_path):
+    save_suite(make_suite("paper-15", 1, 2), tmp_path / "a.suite")
+    path = written(('seed = 1}', 'seed = 1}, {suite_file = "a.suite"}'))
+    setup = set_up(load_job(path), path, tmp_path, quiet=True)
+    assert len(set(setup.training.names)) == len(setup.training.scenarios) == 5
+
+
+MISTAKES = {
+    "unknown key": (("seed = 7", "sead = 7"), "sead: unknown key; the keys are name, seed, .*; did you mean seed?"),
+    "unknown key of an entry": (("count = 3", "cuont = 3"),
+                                "training.suites.0.cuont: unknown key; .*; did you mean count?"),
+    "missing table": (('[held_out]\nsuites = [{suite = "paper-15", count = 2, seed = 2}]', ""),
+                      "held_out: missing; .*; add it"),
+    "wrong type": (("episodes = 30", 'episodes = "30"'), "method.episodes: '30'; must be a valid integer; correct it"),
+    "unknown preset": (('"extended"', '"extendet"'), "planner.preset: 'extendet'; .*; did you mean extended?"),
+    "parameter without effect": (("parameters.clearance", "parameters.velocity"),
+                                 "parameters.velocity: has no effect under preset extended; .*"),
+    "empty range": (("low = 0.02", "low = 0.9"), "parameters.clearance.* 0.9, 0.5; must be .*"),
+    "log scale from 0": (("low = 0.02", "low = 0.0"), "parameters.clearance.low: 0; must be above 0 .*"),
+    "unknown measure": (('measure = "success"', 'measure = "sucess"'),
+                        "constraints.0.measure: 'sucess'; must be one of success, .*; did you mean success?"),
+    "two bounds": (("at_least = 0.95", "at_least = 0.95\nat_most = 1.0"),
+                   "constraints.0: both of at_least and at_most given; .*"),
+    "overlap": (("seed = 2", "seed = 1"), "held_out.suites.0: paper-15, seed 1; overlaps training.suites.0, .*"),
+    "small budget": (("episodes = 30", "episodes = 5"), "method.episodes: 5; .* on 3 training scenarios take 6; .*"),
+    "unknown method": (('"sobol"', '"sobel"'), "method.name: 'sobel'; must be one of .*; did you mean sobol?"),
+    "setting of the method": (("episodes = 30", "episodes = 30\ngeneration = 3"),
+                              "method.generation: .*power of two.*"),
+    "unknown setting": (("episodes = 30", "episodes = 30\npopulation = 8"), "method.population: unknown key; .*"),
+    "two kinds of suite": (('suite = "paper-15", count = 3', 'suite = "paper-15", map = "a.png", count = 3'),
+                           "training.suites.0: suite, map given; exactly one .*; give one"),
+    "no robot": (('preset = "extended"', 'preset = "extended"\nrobot = "tank"'), "planner.robot: 'tank'; .*"),
+    "no weights": (('preset = "extended"', 'preset = "extended"\nweights = "gone.toml"'), "planner: .*gone.toml: .*"),
+    "race on few": (("episodes = 30", "episodes = 30\nracing = true"), "method.racing: true; .*"),
+    "not a share": (("at_least = 0.95", "at_least = 0.95\nworst_share = 1.5"),
+                    "constraints.0.worst_share: 1.5; must be less than or equal to 1; correct it"),
+    "NaN": (("low = 0.02", "low = nan"), "parameters.clearance.low: nan; must be .*"),
+    "integer scale": (('scale = "log"', 'scale = "integer"'), "parameters.clearance.scale: 'integer'; .*"),
+    "no rule": (("[method]", "[choice]\nrule = \"best\"\n[method]"), "choice.rule: 'best'; must be .*"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_is_one_line_with_its_path_value_rule_and_remedy(written, mistake):
+    change, expected = MISTAKES[mistake]
+    (line,) = told(written(change))
+    assert re.fullmatch(expected.replace("?", r"\?"), line), line
+
+
+def test_mistakes_are_listed_together(written):
+    lines = told(written(("seed = 7", "sead = 7"), ("count = 3", "count = 0"), ('"extended"', '"best"'),
+                         ('"sobol"', '"sobel"')))  # fmt: skip
+    assert [line.split(":")[0] for line in lines] == ["training.suites.0.count", "sead", "planner.preset",
+                                                      "method.name"]  # fmt: skip
+    lines = told(written(("seed = 2", "seed = 1"), ("episodes = 30", "episodes = 3"), ("low = 0.02", "low = 0.0"),
+                         ('measure = "success"', 'measure = "luck"')))  # fmt: skip
+    assert [line.split(":")[0] for line in lines] == ["constraints.0.measure", "held_out.suites.0",
+                                                      "parameters.clearance.low", "method.episodes"]  # fmt: skip
+
+
+@pytest.mark.parametrize("text", ["name = office", "a = 1\na = 2\n", "[[["])
+def test_what_is_not_toml_is_told(written, text):
+    (line,) = told(written(text=text))
+    assert re.search(r"not TOML \(.*line \d.*\)", line)
+
+
+def test_the_same_scenarios_by_another_name_are_refused(written, tmp_path):
+    save_suite(make_suite("paper-15", 1, 2), tmp_path / "a.suite")
+    path = written(('suite = "paper-15", count = 2, seed = 2', 'suite_file = "a.suite"'))
+    with pytest.raises(InputError, match=r"held_out: 2 of 2 scenarios are training scenarios too .*; choose other"):
+        set_up(load_job(path), path, tmp_path, quiet=True)
+
+
+def test_a_suite_that_cannot_be_had_is_named_by_its_place(written, tmp_path):
+    path = written(('suite = "paper-15", count = 2', 'map = "gone.map", count = 2'))
+    with pytest.raises(InputError, match=r"held_out\.suites\.0: .*gone.map: no such file"):
+        set_up(load_job(path), path, tmp_path, quiet=True)

@@ -1,0 +1,213 @@
+"""Jobs end in the same bytes, whatever ends them on the way, and do nothing twice."""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scenarios.errors import InputError
+from tests.test_tuning.jobs import CANDIDATES, JOB, SCENARIOS, in_small_pieces, pairs_driven, results_of, written
+from tuning import racing, tiled_judge
+from tuning.job_folder import events_of, locked
+from tuning.run_job import report_job, resume_job, run_job
+from tuning.store import as_evaluations, open_evaluations
+from tuning.weights_file import load_weights
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    return written(tmp_path_factory.mktemp("job"))
+
+
+@pytest.fixture(scope="module")
+def whole(file, tmp_path_factory):
+    """The folder of a job that nothing interrupted."""
+    folder = tmp_path_factory.mktemp("whole") / "out"
+    with pytest.MonkeyPatch.context() as patch:
+        in_small_pieces(patch.setattr)
+        run_job(file, folder, quiet=True)
+    return folder
+
+
+@pytest.fixture(autouse=True)
+def _small_pieces(monkeypatch):
+    in_small_pieces(monkeypatch.setattr)
+
+
+class StopAfter:
+    """Ends the work, by an error of one's choice, in the place of the nth call of the engine."""
+
+    def __init__(self, count, error):
+        self.left, self.error, self.judge = count, error, tiled_judge.judge_pairs
+
+    def __call__(self, *arguments, **settings):
+        self.left -= 1
+        if self.left < 0:
+            raise self.error
+        return self.judge(*arguments, **settings)
+
+
+def test_all_that_the_budget_pays_for_is_judged(whole):
+    training = as_evaluations(whole / "training.zarr")
+    assert training.done.shape == (CANDIDATES, SCENARIOS)
+    assert training.done.all()
+    assert training.generation.tolist() == [0] + [1] * 4 + [2] * 4
+    driven = pairs_driven(events_of(whole))
+    assert len(driven) == len(set(driven))
+    assert sum(suite == "training" for suite, _, _ in driven) == CANDIDATES * SCENARIOS
+
+
+def test_the_recommended_constants_are_a_file_of_weights(whole):
+    from adwa_jax.presets import paper
+    from tuning.space import constant
+
+    loaded = load_weights(whole / "recommended.toml", paper())
+    rows = as_evaluations(whole / "training.zarr").values
+    found = [constant(loaded, "clearance"), constant(loaded, "velocity")]
+    assert np.isclose(rows, found, rtol=1e-6).all(axis=1).any()
+    assert "controller_server" in (whole / "recommended_nav2.yaml").read_text()
+
+
+def test_the_dataset_has_dimensions_units_and_a_table(whole):
+    dataset = open_evaluations(whole)
+    assert dict(dataset["length"].sizes) == {"candidate": CANDIDATES, "scenario": SCENARIOS}
+    assert (dataset["length"].units, dataset["jerk"].units) == ("m", "m/s³")
+    assert dataset["outcome"].dtype == np.int32
+    assert len(dataset.to_dataframe()) == CANDIDATES * SCENARIOS
+    assert dict(open_evaluations(whole, "held_out").sizes)["scenario"] == 3
+
+
+def test_another_run_ends_in_the_same_bytes_and_a_finished_one_stays_as_it_is(whole, file, tmp_path):
+    before = results_of(whole)
+    resume_job(whole, quiet=True)
+    report_job(whole, quiet=True)
+    assert results_of(whole) == before
+    driven = pairs_driven(events_of(whole))
+    assert len(driven) == len(set(driven))
+
+
+@pytest.mark.parametrize("blocks", [0, 6])
+def test_an_interrupted_job_goes_on_to_the_same_bytes(whole, file, tmp_path, monkeypatch, blocks):
+    with monkeypatch.context() as patch:
+        patch.setattr(tiled_judge, "judge_pairs", StopAfter(blocks, KeyboardInterrupt()))
+        with pytest.raises(KeyboardInterrupt):
+            run_job(file, tmp_path / "out", quiet=True)
+    resume_job(tmp_path / "out", quiet=True)
+    assert results_of(tmp_path / "out") == results_of(whole)
+    driven = pairs_driven(events_of(tmp_path / "out"))
+    assert len(driven) == len(set(driven))
+
+
+def test_a_damaged_tile_is_driven_again_and_no_other(whole, file, tmp_path):
+    folder = tmp_path / "out"
+    shutil.copytree(whole, folder)
+    chunk = folder / "training.zarr" / "figures" / "c" / "2" / "1" / "0"
+    content = bytearray(chunk.read_bytes())
+    content[len(content) // 2] ^= 0xFF
+    chunk.write_bytes(content)
+    (folder / "training.zarr" / "figures" / "c" / "4" / "0" / "0").write_bytes(b"")
+    before = len(pairs_driven(events_of(folder)))
+    resume_job(folder, quiet=True)
+    again = pairs_driven(events_of(folder))[before:]
+    assert sorted(again) == [("training", row, scenario) for row, scenario in ((2, 2), (2, 3), (4, 0), (4, 1))]
+    assert results_of(folder) == results_of(whole)
+
+
+def test_a_race_judges_on_fewer_scenarios_and_goes_on_to_the_same_bytes(tmp_path, monkeypatch):
+    def first_is_out(goals, columns, candidates):
+        return np.arange(candidates) == 0
+
+    monkeypatch.setattr(racing, "clearly_out", first_is_out)
+    file = written(tmp_path, JOB.replace("population = 4", "population = 4\nracing = true"))
+    whole, parts = tmp_path / "whole", tmp_path / "parts"
+    run_job(file, whole, quiet=True)
+    with monkeypatch.context() as patch:
+        patch.setattr(tiled_judge, "judge_pairs", StopAfter(7, KeyboardInterrupt()))
+        with pytest.raises(KeyboardInterrupt):
+            run_job(file, parts, quiet=True)
+    resume_job(parts, quiet=True)
+    assert results_of(parts) == results_of(whole)
+    done = as_evaluations(whole / "training.zarr").done
+    assert done.sum(axis=1)[:9].tolist() == [5, 2, 4, 5, 5, 2, 4, 5, 5]
+    (searched,) = [event for event in events_of(whole) if event["event"] == "searched"]
+    assert done.sum() == searched["driven"] <= 45
+
+
+class TestRefusals:
+    def test_a_second_process_is_refused_by_name(self, whole):
+        with locked(whole), pytest.raises(InputError, match=rf"process {os.getpid()} works on it; .*; wait"):
+            resume_job(whole, quiet=True)
+
+    def test_a_folder_that_holds_something_is_refused(self, whole, file, tmp_path):
+        with pytest.raises(InputError, match=r"^--out: .* holds a job already; .* adwa tune resume "):
+            run_job(file, whole, quiet=True)
+        (tmp_path / "mine.txt").write_text("x")
+        with pytest.raises(InputError, match=r"is not empty; "):
+            run_job(file, tmp_path, quiet=True)
+
+    def test_a_folder_without_a_job_cannot_go_on(self, tmp_path):
+        with pytest.raises(InputError, match=r"no job \(job.toml\)"):
+            resume_job(tmp_path, quiet=True)
+
+    def test_a_full_disk_is_one_line_and_nothing_is_lost(self, whole, file, tmp_path, monkeypatch):
+        with monkeypatch.context() as patch:
+            patch.setattr(tiled_judge, "judge_pairs", StopAfter(4, OSError(28, "No space left on device")))
+            with pytest.raises(InputError, match=r"^[^\n]*No space left on device; .*adwa tune resume [^\n]*$"):
+                run_job(file, tmp_path / "out", quiet=True)
+        resume_job(tmp_path / "out", quiet=True)
+        assert results_of(tmp_path / "out") == results_of(whole)
+        driven = pairs_driven(events_of(tmp_path / "out"))
+        assert len(driven) == len(set(driven))
+
+    def test_weights_that_changed_are_told(self, tmp_path, monkeypatch):
+        start = tmp_path / "start.toml"
+        start.write_text("local_heading = 0.8\nclearance = 0.3\nvelocity = 0.8\nglobal_heading = 0.1\n")
+        file = written(tmp_path, JOB.replace('preset = "paper"', 'preset = "paper"\nweights = "start.toml"'))
+        with monkeypatch.context() as patch:
+            patch.setattr(tiled_judge, "judge_pairs", StopAfter(0, KeyboardInterrupt()))
+            with pytest.raises(KeyboardInterrupt):
+                run_job(file, tmp_path / "out", quiet=True)
+        start.write_text(start.read_text().replace("0.3", "0.4"))
+        with pytest.raises(InputError, match=r"out: planner; not what the job began with; .*; restore the file"):
+            resume_job(tmp_path / "out", quiet=True)
+
+
+def started(*arguments):
+    """The command in a process of its own."""
+    code = ("import signal; signal.signal(signal.SIGINT, signal.default_int_handler); import runpy; "
+            "runpy.run_module('tests.test_tuning.jobs', run_name='__main__')")  # fmt: skip
+    return subprocess.Popen([sys.executable, "-c", code, "tune", *map(str, arguments), "-q"], cwd=ROOT,
+                            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)  # fmt: skip
+
+
+def until_blocks(folder, count, process):
+    """Wait until so many blocks are driven in all, or the process has ended."""
+    while process.poll() is None and sum(event["event"] == "block" for event in events_of(folder)) < count:
+        time.sleep(0.01)
+
+
+def test_killed_and_told_to_stop_it_goes_on_to_the_same_bytes_and_does_nothing_twice(whole, file, tmp_path):
+    folder = tmp_path / "out"
+    process = started("run", file, "--out", folder)
+    until_blocks(folder, 2, process)
+    process.kill()
+    process.communicate()
+    for count, sent in ((5, signal.SIGINT), (9, signal.SIGTERM)):
+        process = started("resume", folder)
+        until_blocks(folder, count, process)
+        process.send_signal(sent)
+        out, err = process.communicate(timeout=60)
+        assert (process.returncode, out) == (130, "")
+        assert err == f"adwa: stopped; what is done is kept; go on with: adwa tune resume {folder}\n"
+    resume_job(folder, quiet=True)
+    assert results_of(folder) == results_of(whole)
+    driven = pairs_driven(events_of(folder))
+    assert len(driven) == len(set(driven))

@@ -1,0 +1,232 @@
+"""What a job file means, and what of it cannot be: planner, space, goals, suites; checks across its tables."""
+
+import hashlib
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+
+import jax
+import numpy as np
+
+from adwa_jax.presets import Preset
+from adwa_jax.scenario import Scenario
+from scenarios.errors import InputError
+from scenarios.formats.reading import shown
+from scenarios.suite import SUITE_NAMES, Suite
+from tuning.choice import mistakes as choice_mistakes
+from tuning.job_file import ConstraintTable, Job, ObjectiveTable, SuiteTable, refused
+from tuning.objectives import DEFAULT_OBJECTIVES, Constraint, Goals, Statistic, measures_of
+from tuning.options import Vehicle, configured, reach_of
+from tuning.sources import read_suite
+from tuning.space import Parameter, Space, tunable
+from tuning.store import FIGURES, TILE_WIDTH
+from tuning.suite_files import DEFAULT_COUNT
+from tuning.weights_file import COUNTS
+
+MEASURES = measures_of(tuple(FIGURES))
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class Setup:
+    """All that a job runs with."""
+
+    job: Job
+    space: Space
+    goals: Goals
+    training: Suite
+    held_out: Suite
+    y_down: bool  # whether all maps have their y axis downwards in pictures
+    inputs: dict[str, str]  # place in the file -> checksum of what was read there
+
+
+def mistakes_of(job: Job, folder: Path) -> list[str]:
+    """Mistakes that no table shows by itself, "dotted path: value; rule; remedy" each."""
+    found = [*_measure_mistakes(job), *_overlaps(job, folder), *_racing_mistakes(job)]
+    try:
+        config = planner_of(job, folder)
+    except InputError as error:
+        return [*found, f"planner: {error}"]
+    parameters = list(_parameter_mistakes(job, config))
+    parameters = parameters or list(_failing("parameters", lambda: space_of(job, config)))
+    return [*found, *parameters, *choice_mistakes(job.choice, goals_of(job)), *_budget_mistakes(job)]
+
+
+def planner_of(job: Job, folder: Path) -> Preset:
+    """The planner with its constants as they are before tuning."""
+    table = job.planner
+    weights = None if table.weights is None else folder / table.weights
+    return configured(table.preset, Vehicle(table.robot, table.v_max, table.sensor_range), weights)
+
+
+def space_of(job: Job, config: Preset) -> Space:
+    """What is tuned."""
+    return Space(tuple(Parameter(name, table.low, table.high, table.scale) for name, table in job.parameters.items()),
+                 config)  # fmt: skip
+
+
+def goals_of(job: Job) -> Goals:
+    """What matters; objectives that are left out are those of §3.4."""
+    objectives = DEFAULT_OBJECTIVES if job.objectives is None else tuple(map(_objective, job.objectives))
+    return Goals(objectives, tuple(map(_constraint, job.constraints)))
+
+
+def set_up(job: Job, path: Path, folder: Path, quiet: bool, progress: Progress | None = None) -> Setup:
+    """Read the suites. folder: that paths are relative to; path: of the file, for errors.
+
+    InputError for a suite that cannot be had, for scenarios that are in both, and for a budget below all of training
+    twice.
+    """
+    config = planner_of(job, folder)
+    places = [(f"{table}.suites.{index}", entry) for table in ("training", "held_out")
+              for index, entry in enumerate(getattr(job, table).suites)]  # fmt: skip
+    parts = [_part(path, place, entry, folder, config, quiet, progress) for place, entry in places]
+    training = joined([part.suite for part in parts if part.place.startswith("training")])
+    held_out = joined([part.suite for part in parts if part.place.startswith("held_out")])
+    mistakes = list(_shared(training, held_out))
+    if job.method.episodes < 2 * len(training.scenarios):
+        mistakes.append(_too_few(job.method.episodes, len(training.scenarios)))
+    if mistakes:
+        raise refused(path, mistakes)
+    inputs = {part.place: _checksum(part.suite) for part in parts}
+    inputs["planner"] = hashlib.sha256(repr(config).encode()).hexdigest()
+    y_down = all(part.y_down for part in parts)
+    return Setup(job, space_of(job, config), goals_of(job), training, held_out, y_down, inputs)
+
+
+def joined(suites: list[Suite]) -> Suite:
+    """Suites one after another; names stay different."""
+    if len(suites) == 1:
+        return suites[0]
+    names = [name for suite in suites for name in suite.names]
+    if len(set(names)) < len(names):
+        names = [f"{index}-{name}" for index, suite in enumerate(suites) for name in suite.names]
+    scenarios = tuple(scenario for suite in suites for scenario in suite.scenarios)
+    title = " + ".join(suite.name for suite in suites)
+    return Suite(title, scenarios, tuple(names), {"suites": [suite.recipe for suite in suites]})
+
+
+@dataclass(frozen=True)
+class _Part:
+    place: str
+    suite: Suite
+    y_down: bool
+
+
+def _part(path: Path, place: str, entry: SuiteTable, folder: Path, config: Preset, quiet: bool,
+          progress: Progress | None) -> _Part:
+    try:
+        work = read_suite(entry.source(folder), reach_of(config.constants.robot), quiet, progress)
+    except InputError as error:
+        raise refused(path, [f"{place}: {error}"]) from None
+    return _Part(place, work.suite, work.y_down)
+
+
+def _objective(table: ObjectiveTable) -> Statistic:
+    return Statistic(table.measure, table.direction, table.worst_share)
+
+
+def _constraint(table: ConstraintTable) -> Constraint:
+    if table.at_least is not None:
+        return Constraint(Statistic(table.measure, "max", table.worst_share), table.at_least)
+    return Constraint(Statistic(table.measure, "min", table.worst_share), float(table.at_most or 0.0))
+
+
+def _measure_mistakes(job: Job) -> Iterator[str]:
+    for table, entries in (("objectives", job.objectives or []), ("constraints", job.constraints)):
+        for index, entry in enumerate(entries):
+            if entry.measure not in MEASURES:
+                yield (f"{table}.{index}.measure: {shown(entry.measure)}; must be one of {', '.join(MEASURES)}; "
+                       f"{_near(entry.measure, MEASURES)}")  # fmt: skip
+    labels = [_objective(entry).label for entry in job.objectives or []]
+    for index, label in enumerate(labels):
+        if label in labels[:index]:
+            yield f"objectives.{index}: {label}; is there already; remove it"
+
+
+def _parameter_mistakes(job: Job, config: Preset) -> Iterator[str]:
+    names = tunable(config.options.rules)
+    for name, table in job.parameters.items():
+        place = f"parameters.{name}"
+        if name not in names:
+            yield (f"{place}: has no effect under preset {job.planner.preset}; must be one of {', '.join(names)}; "
+                   f"{_near(name, names)}")  # fmt: skip
+            continue
+        yield from _failing(place, lambda name=name, table=table: Parameter(name, table.low, table.high, table.scale))
+        low, high = COUNTS.get(name, (0, table.high))
+        if name in COUNTS and not low <= table.low <= table.high <= high:
+            yield f"{place}: {table.low:g} to {table.high:g}; must be within {low} to {high}; correct it"
+
+
+def _racing_mistakes(job: Job) -> Iterator[str]:
+    counts = [_counted(entry) for entry in job.training.suites]
+    if job.method.racing and None not in counts and sum(filter(None, counts)) <= TILE_WIDTH:
+        yield (f"method.racing: true; a race begins on {TILE_WIDTH} training scenarios, there must be more; raise "
+               "their count, or leave racing out")  # fmt: skip
+
+
+def _budget_mistakes(job: Job) -> Iterator[str]:
+    """As far as the counts are known before any suite is read."""
+    counts = [_counted(entry) for entry in job.training.suites]
+    scenarios = sum(filter(None, counts))
+    if None not in counts and job.method.episodes < 2 * scenarios:
+        yield _too_few(job.method.episodes, scenarios)
+
+
+def _counted(entry: SuiteTable) -> int | None:
+    return entry.count or (None if entry.suite_file or entry.suite not in (None, *SUITE_NAMES) else DEFAULT_COUNT)
+
+
+def _too_few(episodes: int, scenarios: int) -> str:
+    return (f"method.episodes: {episodes}; the default constants and one more candidate on {scenarios} training "
+            f"scenarios take {2 * scenarios}; raise it, or drive fewer scenarios")  # fmt: skip
+
+
+def _overlaps(job: Job, folder: Path) -> Iterator[str]:
+    """Suites of one recipe and seed, in training and held out; or twice in one of them."""
+    seen: dict[tuple, str] = {}
+    for table in ("training", "held_out"):
+        for index, entry in enumerate(getattr(job, table).suites):
+            place = f"{table}.suites.{index}"
+            where = entry.suite or str((folder / str(entry.suite_file or entry.map)).resolve())
+            first = seen.setdefault((where, entry.seed), place)
+            if first != place:
+                yield (f"{place}: {entry.label}, seed {entry.seed}; overlaps {first}, whose scenarios are the same as "
+                       "far as both go; give it another seed, or another map or file")  # fmt: skip
+
+
+def _shared(training: Suite, held_out: Suite) -> Iterator[str]:
+    known = {_content(scenario): name for scenario, name in zip(training.scenarios, training.names, strict=True)}
+    same = [(name, known[content]) for scenario, name in zip(held_out.scenarios, held_out.names, strict=True)
+            if (content := _content(scenario)) in known]  # fmt: skip
+    if same:
+        yield (f"held_out: {len(same)} of {len(held_out.names)} scenarios are training scenarios too ({same[0][0]} is "
+               f"{same[0][1]}); none may be; choose other seeds, maps or files")  # fmt: skip
+
+
+def _content(scenario: Scenario) -> bytes:
+    """A checksum of all that a scenario is."""
+    digest = hashlib.sha256()
+    for leaf in jax.tree.leaves(scenario):
+        array = np.asarray(leaf)
+        digest.update(f"{array.dtype.str}{array.shape}".encode() + array.tobytes())
+    return digest.digest()
+
+
+def _checksum(suite: Suite) -> str:
+    return hashlib.sha256(b"".join(map(_content, suite.scenarios)) + "\n".join(suite.names).encode()).hexdigest()
+
+
+def _failing(place: str, make: Callable[[], object]) -> Iterator[str]:
+    """The mistake for which something cannot be made."""
+    try:
+        make()
+    except InputError as error:
+        field, _, rest = str(error).partition(": ")
+        yield f"{place}.{field}: {rest}" if field.isidentifier() else f"{place}: {error}"
+
+
+def _near(value: str, names: tuple[str, ...]) -> str:
+    near = get_close_matches(value, names, n=1)
+    return f"did you mean {near[0]}?" if near else "remove or rename it"
