@@ -7,6 +7,7 @@ given the next.
 Dimension letters: B lanes; T steps; the rest as in `scenario`.
 """
 
+from collections.abc import Callable
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -15,15 +16,21 @@ import jax.numpy as jnp
 from jax import lax
 
 from adwa_jax.constants import Constants, Options
+from adwa_jax.dwa import Judged, as_printed, chosen
 from adwa_jax.episode import RUNNING, Episode, EpisodeState, sensed_now
 from adwa_jax.judge import finish_episode
-from adwa_jax.learn import Memory, first_memory, learns
+from adwa_jax.learn import Memory, field_of, first_memory, learns
+from adwa_jax.native import whole
 from adwa_jax.obstacles import MoverStates, movers_at
 from adwa_jax.plan import Plan
+from adwa_jax.printed_lanes import judged_lanes
 from adwa_jax.rollout import RobotState
 from adwa_jax.route import Route
+from adwa_jax.rules import Rules
 from adwa_jax.scenario import Scenario
-from adwa_jax.simulate import control_step, most_sensed, start_episode, take_in
+from adwa_jax.simulate import Outlook, act, control_step, look, most_sensed, start_episode, take_in
+
+PRINTED = Rules(), Rules(fine_field=True)  # rules whose control step is compiled in whole stages
 
 
 class Task(NamedTuple):
@@ -123,14 +130,56 @@ def step_lanes(lanes: Lanes, options: Options) -> Lanes:
     """One control step of every lane that runs; before it, those learn that noticed something."""
     if learns(lanes.task.scenario, options):
         lanes = _learnt(lanes, options)
+    step = _step_as_printed if _has_stages(lanes, options) else _step
+    return lanes._replace(state=step(lanes, options))
+
+
+def _has_stages(lanes: Lanes, options: Options) -> bool:
+    """Whether `_step_as_printed` is for these lanes; static. One lane gains nothing and would differ in last bits."""
+    scenario = lanes.task.scenario
+    unknown = scenario.squares.valid.size + scenario.movers.valid.size
+    return (as_printed(lanes.task.constants, options) and options.rules in PRINTED and lanes.state.step.size > 1
+            and unknown > 0)  # fmt: skip
+
+
+def _step_as_printed(lanes: Lanes, options: Options) -> EpisodeState:
+    """`control_step` of every lane in stages, most of them native functions."""
+    state, memory, task = lanes
+
+    def look_one(state: EpisodeState, memory: Memory, task: Task) -> Outlook:
+        return look(state, memory, task.scenario, task.plan, task.constants, options)
+
+    # Without movers there is no use for the time, and a compiler fails on operands that nothing reads.
+    stage = whole if task.scenario.movers.valid.size else _apart
+    outlook = stage(jax.vmap(look_one), state, memory, task)
+    fields = jax.vmap(field_of)(memory, task.plan)
+    judged = judged_lanes(state.robot, fields, outlook.sensed, task.constants, options)
+
+    def act_one(state: EpisodeState, judged: Judged, outlook: Outlook, memory: Memory, task: Task) -> EpisodeState:
+        decision = chosen(state.robot, judged, outlook.guidance, task.constants, options)
+        return _if_running(act(state, decision, outlook, memory, *task, options), state)
+
+    return whole(jax.vmap(act_one), state, judged, outlook, memory, task)
+
+
+def _step(lanes: Lanes, options: Options) -> EpisodeState:
+    """`control_step` of every lane."""
     state, (scenario, _, constants) = lanes.state, lanes.task
     most = most_sensed(jax.vmap(partial(sensed_now, options=options))(state, scenario, constants))
 
     def step_one(state: EpisodeState, memory: Memory, task: Task) -> EpisodeState:
-        moved = control_step(state, memory, *task, options, most)[0]
-        return jax.tree.map(lambda new, old: jnp.where(state.outcome == RUNNING, new, old), moved, state)
+        return _if_running(control_step(state, memory, *task, options, most)[0], state)
 
-    return lanes._replace(state=jax.vmap(step_one)(state, lanes.memory, lanes.task))
+    return jax.vmap(step_one)(state, lanes.memory, lanes.task)
+
+
+def _apart(function: Callable, *operands: Any) -> Any:
+    """As `whole`, but a kernel for each operation."""
+    return function(*operands)
+
+
+def _if_running(moved: EpisodeState, state: EpisodeState) -> EpisodeState:
+    return jax.tree.map(lambda new, old: jnp.where(state.outcome == RUNNING, new, old), moved, state)
 
 
 def _learnt(lanes: Lanes, options: Options) -> Lanes:
