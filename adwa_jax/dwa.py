@@ -12,7 +12,7 @@ from jax import lax
 from adwa_jax.admissible import halts_clear, is_admissible
 from adwa_jax.constants import Constants, Options
 from adwa_jax.grid import DistanceField, Scalar
-from adwa_jax.native import largest
+from adwa_jax.native import folded
 from adwa_jax.obstacles import Sensed
 from adwa_jax.prediction import Prediction, candidate_clearance, clearance_now, predict
 from adwa_jax.profiles import (
@@ -122,9 +122,19 @@ def chosen(state: RobotState, judged: Judged, guidance: Guidance, constants: Con
 
 
 def _first_largest(values: jax.Array) -> jax.Array:
-    """[] int32: the lowest index (v-major) of the largest value; two plain reductions cost less than an argmax."""
+    """[] int32: the lowest index (v-major) of the largest value. values: [V, N].
+
+    Index and value go together through the comparisons. To look for what equals the largest value would take a compiler
+    that works out no value twice, with other last bits.
+    """
     index = jnp.arange(values.size, dtype=jnp.int32).reshape(values.shape)
-    return jnp.min(jnp.where(values == largest(values), index, values.size - 1))
+
+    def better(best: tuple, other: tuple) -> tuple:
+        first = (best[0] > other[0]) | ((best[0] == other[0]) & (best[1] < other[1]))
+        return jnp.where(first, best[0], other[0]), jnp.where(first, best[1], other[1])
+
+    columns = folded(better, list(zip(values, index, strict=True)))
+    return folded(better, list(zip(*columns, strict=True)))[1]
 
 
 def _judged_as_printed(state: RobotState, field: DistanceField, sensed: Sensed, constants: Constants,

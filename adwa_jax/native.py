@@ -24,22 +24,21 @@ def whole(function: Callable, *operands: Any) -> Any:
 def total(values: jax.Array) -> jax.Array:
     """[] sum of [...] float32: `jnp.sum` becomes a call of a library, for which there is no place inside a `whole`."""
     row = values.reshape(-1, values.shape[-1])
-    return _in_pairs(jnp.add, _in_pairs(jnp.add, row))
+    return folded(jnp.add, list(folded(jnp.add, list(row))))
 
 
 def largest(values: jax.Array) -> jax.Array:
     """[] largest of [...] float32 that hold no NaN, as `total`."""
     row = values.reshape(-1, values.shape[-1])
-    return _in_pairs(_greater, _in_pairs(_greater, row))
+    return folded(_greater, list(folded(_greater, list(row))))
 
 
 def _greater(a: jax.Array, b: jax.Array) -> jax.Array:
     return jnp.where(a > b, a, b)
 
 
-def _in_pairs(function: Callable, values: jax.Array) -> jax.Array:
-    """Fold the first axis, neighbours first: no chain of operations is longer than it must be."""
-    rows = list(values)
+def folded(function: Callable, rows: list) -> Any:
+    """Fold rows, neighbours first: no chain of operations is longer than it must be."""
     while len(rows) > 1:
         odd = rows[len(rows) // 2 * 2 :]
         rows = [function(*pair) for pair in zip(rows[::2], rows[1::2], strict=False)] + odd
