@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax import lax
 
 from adwa_jax.constants import Constants, Options
@@ -31,6 +32,8 @@ from adwa_jax.scenario import Scenario
 from adwa_jax.simulate import Outlook, act, control_step, look, most_sensed, start_episode, take_in
 
 PRINTED = Rules(), Rules(fine_field=True)  # rules whose control step is compiled in whole stages
+LARGEST_SIDE = 256  # [cells] of a map on which it is
+VECTOR = 8  # numbers that a processor takes at once
 
 
 class Task(NamedTuple):
@@ -67,8 +70,9 @@ def drive_lanes(scenarios: Scenario, plans: Plan, constants: Constants, options:
     scenarios, plans = jax.tree.map(jnp.asarray, (scenarios, plans))
     count = scenarios.start.shape[0]
     constants = jax.tree.map(lambda value: jnp.full(count, value, jnp.float32), constants)
-    lanes = jax.vmap(_begun)(Task(scenarios, plans, constants))
-    return results(lax.while_loop(any_running, partial(step_lanes, options=options), lanes))
+    lanes = _in_whole_vectors(jax.vmap(_begun)(Task(scenarios, plans, constants)), options)
+    driven = results(lax.while_loop(any_running, partial(step_lanes, options=options), lanes))
+    return jax.tree.map(lambda leaf: leaf[:count], driven)
 
 
 def filled(lanes: Lanes, task: Task, place: jax.Array) -> Lanes:
@@ -76,9 +80,9 @@ def filled(lanes: Lanes, task: Task, place: jax.Array) -> Lanes:
     return _written(lanes, _begun(task), place)
 
 
-def idle_lanes(task: Task, count: int) -> Lanes:
-    """`count` lanes, none of which runs, of the shapes of an unbatched task."""
-    shapes = jax.eval_shape(_begun, task)
+def idle_lanes(task: Task, options: Options, count: int) -> Lanes:
+    """At least `count` lanes, none of which runs, of the shapes of an unbatched task."""
+    count, shapes = lanes_in_step(task, options, count), jax.eval_shape(_begun, task)
     lanes = jax.tree.map(lambda leaf: jnp.zeros((count, *leaf.shape), leaf.dtype), shapes)
     return lanes._replace(state=lanes.state._replace(outcome=jnp.zeros(count, jnp.int32)))
 
@@ -109,10 +113,10 @@ def results(lanes: Lanes) -> Episode:
 def trace(scenario: Scenario, plan: Plan, constants: Constants, options: Options, steps: int) -> tuple[Episode, Trace]:
     """The same episode, its path kept: at most `steps` control steps, which must cover the scenario's time limit.
 
-    Unbatched; driven in a lane of its own.
+    Unbatched; driven in lanes that all do the same.
     """
     task = jax.tree.map(jnp.asarray, Task(scenario, plan, constants))
-    lanes = jax.tree.map(lambda leaf: leaf[None], _begun(task))
+    lanes = _in_whole_vectors(jax.tree.map(lambda leaf: leaf[None], _begun(task)), options)
 
     def body_fun(lanes: Lanes, _: None) -> tuple[Lanes, tuple]:
         lanes = step_lanes(lanes, options)
@@ -130,16 +134,35 @@ def step_lanes(lanes: Lanes, options: Options) -> Lanes:
     """One control step of every lane that runs; before it, those learn that noticed something."""
     if learns(lanes.task.scenario, options):
         lanes = _learnt(lanes, options)
-    step = _step_as_printed if _has_stages(lanes, options) else _step
+    step = _step_as_printed if _has_stages(lanes.task, options) else _step
     return lanes._replace(state=step(lanes, options))
 
 
-def _has_stages(lanes: Lanes, options: Options) -> bool:
-    """Whether `_step_as_printed` is for these lanes; static. One lane gains nothing and would differ in last bits."""
-    scenario = lanes.task.scenario
-    unknown = scenario.squares.valid.size + scenario.movers.valid.size
-    return (as_printed(lanes.task.constants, options) and options.rules in PRINTED and lanes.state.step.size > 1
-            and unknown > 0)  # fmt: skip
+def lanes_in_step(task: Task, options: Options, count: int) -> int:
+    """How many lanes are stepped where `count` are asked for; static.
+
+    In stages, up to whole vectors: for fewer numbers a compiler makes other instructions, whose last bits differ, and
+    an episode would depend on its company.
+    """
+    return count + -count % VECTOR if _has_stages(task, options) else count
+
+
+def _in_whole_vectors(lanes: Lanes, options: Options) -> Lanes:
+    """The lanes, the last of them repeated up to `lanes_in_step`."""
+    count = lanes.state.step.size
+    places = np.minimum(np.arange(lanes_in_step(lanes.task, options, count)), count - 1)
+    return lanes if len(places) == count else jax.tree.map(lambda leaf: leaf[places], lanes)
+
+
+def _has_stages(task: Task, options: Options) -> bool:
+    """Whether `_step_as_printed` drives such tasks, one or many; static, and the same however many there are.
+
+    Not where there is nothing unknown, since a compiler fails on a stage's operands that nothing reads; nor on large
+    maps, whose lanes take too much memory for whole vectors of them.
+    """
+    scenario, rows, columns = task.scenario, *task.scenario.grid.occupied.shape[-2:]
+    return (as_printed(task.constants, options) and options.rules in PRINTED and max(rows, columns) <= LARGEST_SIDE
+            and scenario.squares.valid.size + scenario.movers.valid.size > 0)  # fmt: skip
 
 
 def _step_as_printed(lanes: Lanes, options: Options) -> EpisodeState:

@@ -207,7 +207,7 @@ def _work(queue: _Queue, options: Options, width: int, table: _Table) -> None:
             taken = queue.take(len(places))
             if not taken:
                 break
-            lanes = _with(lanes, [task for _, task in taken], places[: len(taken)], width)
+            lanes = _with(lanes, [task for _, task in taken], places[: len(taken)], options, width)
             held |= dict(zip(places, (pair for pair, _ in taken), strict=False))
         if lanes is None or not held:
             return
@@ -216,9 +216,9 @@ def _work(queue: _Queue, options: Options, width: int, table: _Table) -> None:
         lanes = moved
 
 
-def _with(lanes: Lanes | None, tasks: list[Task], places: list[int], width: int) -> Lanes:
+def _with(lanes: Lanes | None, tasks: list[Task], places: list[int], options: Options, width: int) -> Lanes:
     """The lanes with new episodes; idle ones are made first if there are none yet."""
-    lanes = _idle(tasks[0], width) if lanes is None else lanes
+    lanes = _idle(tasks[0], options, width) if lanes is None else lanes
     missing = FILLED_AT_ONCE - len(tasks)
     rows = jax.tree.map(lambda *leaves: np.stack(leaves), *tasks, *tasks[:1] * missing)
     return _fill(lanes, rows, np.array(places + [0] * missing, np.int32), np.int32(len(tasks)))
@@ -242,9 +242,9 @@ def driven_columns(episodes: Episode) -> dict[str, Any]:
             "brakings": episodes.brakings, "replans": episodes.replans, **episodes.measures._asdict()}  # fmt: skip
 
 
-@partial(jax.jit, static_argnames="width")
-def _idle(task: Task, width: int) -> Lanes:
-    return idle_lanes(task, width)
+@partial(jax.jit, static_argnames=("options", "width"))
+def _idle(task: Task, options: Options, width: int) -> Lanes:
+    return idle_lanes(task, options, width)
 
 
 @partial(jax.jit, donate_argnames="lanes")
