@@ -24,6 +24,7 @@ from adwa_jax.learn import Memory, field_of, first_memory, learns
 from adwa_jax.native import whole
 from adwa_jax.obstacles import MoverStates, movers_at
 from adwa_jax.plan import Plan
+from adwa_jax.prediction import VECTOR
 from adwa_jax.printed_lanes import judged_lanes
 from adwa_jax.rollout import RobotState
 from adwa_jax.route import Route
@@ -33,7 +34,6 @@ from adwa_jax.simulate import Outlook, act, control_step, look, most_sensed, sta
 
 PRINTED = Rules(), Rules(fine_field=True)  # rules whose control step is compiled in whole stages
 LARGEST_SIDE = 256  # [cells] of a map on which it is
-VECTOR = 8  # numbers that a processor takes at once
 
 
 class Task(NamedTuple):
@@ -113,10 +113,10 @@ def results(lanes: Lanes) -> Episode:
 def trace(scenario: Scenario, plan: Plan, constants: Constants, options: Options, steps: int) -> tuple[Episode, Trace]:
     """The same episode, its path kept: at most `steps` control steps, which must cover the scenario's time limit.
 
-    Unbatched; driven in lanes that all do the same.
+    Unbatched; driven in a lane whose neighbours are idle.
     """
     task = jax.tree.map(jnp.asarray, Task(scenario, plan, constants))
-    lanes = _in_whole_vectors(jax.tree.map(lambda leaf: leaf[None], _begun(task)), options)
+    lanes = filled(idle_lanes(task, options, 1), task, jnp.int32(0))
 
     def body_fun(lanes: Lanes, _: None) -> tuple[Lanes, tuple]:
         lanes = step_lanes(lanes, options)
@@ -157,12 +157,15 @@ def _in_whole_vectors(lanes: Lanes, options: Options) -> Lanes:
 def _has_stages(task: Task, options: Options) -> bool:
     """Whether `_step_as_printed` drives such tasks, one or many; static, and the same however many there are.
 
-    Not where there is nothing unknown, since a compiler fails on a stage's operands that nothing reads; nor on large
-    maps, whose lanes take too much memory for whole vectors of them.
+    Only where it is known to compile: a compiler fails on a stage's operand that nothing reads, as happens where there
+    is nothing unknown, or where loops are of one turn. Nor on large maps, whose lanes take too much memory for whole
+    vectors of them.
     """
     scenario, rows, columns = task.scenario, *task.scenario.grid.occupied.shape[-2:]
-    return (as_printed(task.constants, options) and options.rules in PRINTED and max(rows, columns) <= LARGEST_SIDE
-            and scenario.squares.valid.size + scenario.movers.valid.size > 0)  # fmt: skip
+    squares, movers = (obstacles.valid.shape[-1] for obstacles in (scenario.squares, scenario.movers))
+    return (as_printed(task.constants, options) and options.rules in PRINTED and options.dwa.horizon_steps > 1
+            and squares + movers > 0 and squares % VECTOR == 0 and movers % VECTOR == 0
+            and max(rows, columns) <= LARGEST_SIDE)  # fmt: skip
 
 
 def _step_as_printed(lanes: Lanes, options: Options) -> EpisodeState:
