@@ -2,21 +2,19 @@
 
 Why it stands beside the unbatched kernel: under `vmap` a `while_loop` selects the whole carry each turn and runs until
 the slowest lane ends; and on a CPU every operation in a loop's body is a kernel of its own, whose call costs more than
-the few numbers it handles. Here each lane runs to its own end before the next begins, and `_whole` has all of it
+the few numbers it handles. Here each lane runs to its own end before the next begins, and `whole` has all of it
 compiled to one native function. What then counts is the number of instructions, so the open list is leaner: f is not
 stored but made from g where a row is scanned, and of the three rows that an expansion touches only the closed cell's
 own is scanned, because in the others costs can only have fallen.
 """
 
-from collections.abc import Callable
 from functools import partial, reduce
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import lax
-from jax.experimental.xla_metadata import set_xla_metadata
 
 from adwa_jax.astar import (
     FAR,
@@ -32,6 +30,7 @@ from adwa_jax.astar import (
     unit_costs,
     weighted_heuristic,
 )
+from adwa_jax.native import whole
 
 BLOCK = np.arange(9, dtype=np.int32).reshape(3, 3)  # index into MOVES of each place in a 3 × 3 neighbourhood
 CENTRE = BLOCK == 4
@@ -102,17 +101,7 @@ def search_lanes(blocked: jax.Array, start_cell: jax.Array, goal_cell: jax.Array
     """
     costs = unit_costs(*blocked.shape[1:])
     one = partial(_search, options=options, costs=costs)
-    return _whole(partial(lax.map, lambda lane: one(*lane)), (blocked, start_cell, goal_cell, weight))
-
-
-def _whole(function: Callable, *operands) -> Any:
-    """function(*operands), compiled on a CPU as one native function rather than as a kernel for each operation.
-
-    It is a wall as well: what is inside is computed once, not once more in every operation outside that uses it, and a
-    write outside that needs the outcome comes after all reads inside, so that arrays are updated in place.
-    Only speed rests on the marks: a compiler that does not know them ignores them.
-    """
-    return set_xla_metadata(jax.jit(function)(*operands), inlineable="false", xla_cpu_small_call="true")
+    return whole(partial(lax.map, lambda lane: one(*lane)), (blocked, start_cell, goal_cell, weight))
 
 
 def _search(blocked: jax.Array, start_cell: jax.Array, goal_cell: jax.Array, weight: jax.Array,
@@ -128,7 +117,7 @@ def _search(blocked: jax.Array, start_cell: jax.Array, goal_cell: jax.Array, wei
 
     def body_fun(carry: _Carry) -> _Carry:
         carry = _expand(carry, lane, _line(columns), costs)
-        cell, status = _whole(choose, carry.open, carry.expansions, lane.goal)
+        cell, status = whole(choose, carry.open, carry.expansions, lane.goal)
         return carry._replace(cell=cell, status=status)
 
     begun = begin(blocked, start_cell, goal_cell)
@@ -163,7 +152,7 @@ def _lane(blocked: jax.Array, start_cell: jax.Array, goal_cell: jax.Array, weigh
     height, width = _line(rows).length, _line(columns).length
     ring = ((1, height - rows - 1), (1, width - columns - 1))
     weigh = partial(weighted_heuristic, (rows, columns), heuristic=options.heuristic, costs=costs)
-    weighted, floor = _whole(lambda goal, weight: weigh(goal, weight), goal_cell, weight)
+    weighted, floor = whole(lambda goal, weight: weigh(goal, weight), goal_cell, weight)
     column = jnp.arange(width, dtype=jnp.int32)[None, :]
     return _Lane(
         legal=jnp.pad(legal_moves(blocked, options.corner_rule), ring),
@@ -177,9 +166,9 @@ def _lane(blocked: jax.Array, start_cell: jax.Array, goal_cell: jax.Array, weigh
 def _expand(carry: _Carry, lane: _Lane, columns: _Line, costs: Costs) -> _Carry:
     """Close the cell, offer its neighbours a route through it, and renew the best of the three rows it touches."""
     row, column, _ = carry.cell
-    block, near_f, near_tie = _whole(partial(_offer, costs=costs), carry.open, carry.cell, lane)
+    block, near_f, near_tie = whole(partial(_offer, costs=costs), carry.open, carry.cell, lane)
     g = _put(carry.open.g, block, row - 1, column - 1)
-    own_f, own_tie = _whole(partial(_scan, columns=columns), g, row, lane.weighted, lane.tie)
+    own_f, own_tie = whole(partial(_scan, columns=columns), g, row, lane.weighted, lane.tie)
     own = np.arange(3) == 1
     return carry._replace(
         open=_Open(
@@ -262,8 +251,8 @@ def _least(line: jax.Array) -> jax.Array:
     """
     if len(line) > UNROLLED:
         for width in (UNROLLED, 8) if len(line) > 4 * UNROLLED else (8,):
-            line = _whole(partial(_folded, width=width), line)
-    return _whole(_least_of_pairs, line)
+            line = whole(partial(_folded, width=width), line)
+    return whole(_least_of_pairs, line)
 
 
 def _folded(line: jax.Array, width: int) -> jax.Array:
@@ -299,7 +288,7 @@ def _result(carry: _Carry, lane: _Lane, shape: tuple[int, int], costs: Costs) ->
         return found & away & (walk.cells < capacity)
 
     def body_fun(walk: _Walk) -> _Walk:
-        return _step_back(walk, _whole(parent, walk.cell, carry.open.g, carry.order, lane.legal), capacity, costs)
+        return _step_back(walk, whole(parent, walk.cell, carry.open.g, carry.order, lane.legal), capacity, costs)
 
     walk = lax.while_loop(cond_fun, body_fun, _Walk(
         cell=_Cell(lane.goal[0], lane.goal[1], carry.open.g[lane.goal[0], lane.goal[1]]),

@@ -12,6 +12,7 @@ from jax import lax
 from adwa_jax.admissible import halts_clear, is_admissible
 from adwa_jax.constants import Constants, Options
 from adwa_jax.grid import DistanceField, Scalar
+from adwa_jax.native import folded
 from adwa_jax.obstacles import Sensed
 from adwa_jax.prediction import Prediction, candidate_clearance, clearance_now, predict
 from adwa_jax.profiles import (
@@ -25,7 +26,7 @@ from adwa_jax.profiles import (
     window_profiles,
     yaw_rates_over_range,
 )
-from adwa_jax.rollout import Pose, RobotState, arcs
+from adwa_jax.rollout import Arcs, Pose, RobotState, arcs
 from adwa_jax.route import Ahead, foot_on
 from adwa_jax.score import (
     Terms,
@@ -41,7 +42,7 @@ from adwa_jax.score import (
     velocity_term,
     weighted_sum,
 )
-from adwa_jax.window import velocity_window
+from adwa_jax.window import RobotLimits, velocity_window
 
 
 class Guidance(NamedTuple):
@@ -72,7 +73,7 @@ class Decision(NamedTuple):
     candidates: Candidates
 
 
-class _Judged(NamedTuple):
+class Judged(NamedTuple):
     """What is known of the candidates before they are scored."""
 
     v: jax.Array  # [V]
@@ -93,10 +94,19 @@ def decide(state: RobotState, guidance: Guidance, field: DistanceField, sensed: 
 
     Unbatched. No NaN for finite input.
     """
+    judge = _judged_as_printed if as_printed(constants, options) else _judged_beyond
+    return chosen(state, judge(state, field, sensed, constants, options), guidance, constants, options)
+
+
+def as_printed(constants: Constants, options: Options) -> bool:
+    """Whether the candidates are the paper's; static."""
     rules = options.rules
-    beyond = any([rules.ramp, rules.second_phase, rules.reverse, rules.stopping, rules.long_watch, rules.mover_terms,
-                  rules.mover_margin, len(constants.robot.disc_offsets) > 1])  # fmt: skip
-    judged = (_judged_beyond if beyond else _judged_as_printed)(state, field, sensed, constants, options)
+    return not any([rules.ramp, rules.second_phase, rules.reverse, rules.stopping, rules.long_watch, rules.mover_terms,
+                    rules.mover_margin, len(constants.robot.disc_offsets) > 1])  # fmt: skip
+
+
+def chosen(state: RobotState, judged: Judged, guidance: Guidance, constants: Constants, options: Options) -> Decision:
+    """The second half of `decide`: scores the candidates and picks one."""
     terms = _terms(state, judged, guidance, constants, options)
     score = weighted_sum(normalise(terms, judged.admissible, _scales(constants, options), options.dwa.normalisation),
                          constants.weights)
@@ -114,28 +124,45 @@ def decide(state: RobotState, guidance: Guidance, field: DistanceField, sensed: 
 
 
 def _first_largest(values: jax.Array) -> jax.Array:
-    """[] int32: the lowest index (v-major) of the largest value; two plain reductions cost less than an argmax."""
+    """[] int32: the lowest index (v-major) of the largest value. values: [V, N].
+
+    Index and value go together through the comparisons. To look for what equals the largest value would take a compiler
+    that works out no value twice, with other last bits.
+    """
     index = jnp.arange(values.size, dtype=jnp.int32).reshape(values.shape)
-    return jnp.min(jnp.where(values == jnp.max(values), index, values.size - 1))
+
+    def better(best: tuple, other: tuple) -> tuple:
+        first = (best[0] > other[0]) | ((best[0] == other[0]) & (best[1] < other[1]))
+        return jnp.where(first, best[0], other[0]), jnp.where(first, best[1], other[1])
+
+    columns = folded(better, list(zip(values, index, strict=True)))
+    return folded(better, list(zip(*columns, strict=True)))[1]
 
 
 def _judged_as_printed(state: RobotState, field: DistanceField, sensed: Sensed, constants: Constants,
-                       options: Options) -> _Judged:
+                       options: Options) -> Judged:
     """The paper's candidates: constant velocities of the window (eqs. 6 and 7), clear over the whole horizon."""
     robot, dt, dwa = constants.robot, constants.behaviour.dt, options.dwa
     v, yaw_rate = velocity_window(state.v, state.yaw_rate, robot, dt, dwa.v_samples, dwa.yaw_rate_samples)
     arc = arcs(state.heading, yaw_rate, dt, dwa.horizon_steps)
-    clearance = candidate_clearance(state, v, arc, field, sensed, dt) - robot.radius
+    clearance = candidate_clearance(state, v, arc, field, sensed, dt)
+    return judged_by_clearance(state, v, yaw_rate, jax.tree.map(lambda rows: rows[-1], arc), clearance, robot)
+
+
+def judged_by_clearance(state: RobotState, v: jax.Array, yaw_rate: jax.Array, last: Arcs, clearance: jax.Array,
+                        robot: RobotLimits) -> Judged:
+    """The paper's candidates. last: the last row of their arcs, [N] each; clearance: [V, N] from the robot's centre."""
+    clearance = clearance - robot.radius
     end = Pose(
-        x=state.x + v[:, None] * arc.reach_x[-1][None, :],
-        y=state.y + v[:, None] * arc.reach_y[-1][None, :],
-        heading=arc.heading[-1][None, :],
+        x=state.x + v[:, None] * last.reach_x[None, :],
+        y=state.y + v[:, None] * last.reach_y[None, :],
+        heading=last.heading[None, :],
     )
-    return _Judged(v, yaw_rate, end, clearance, is_admissible(clearance, v, yaw_rate, robot), None, -clearance)
+    return Judged(v, yaw_rate, end, clearance, is_admissible(clearance, v, yaw_rate, robot), None, -clearance)
 
 
 def _judged_beyond(state: RobotState, field: DistanceField, sensed: Sensed, constants: Constants,
-                   options: Options) -> _Judged:
+                   options: Options) -> Judged:
     """Candidates as the rules make and judge them."""
     robot, behaviour, rules, dwa = constants.robot, constants.behaviour, options.rules, options.dwa
     profiles = candidate_profiles(state, constants, options)
@@ -157,7 +184,7 @@ def _judged_beyond(state: RobotState, field: DistanceField, sensed: Sensed, cons
         least = jnp.minimum(found.static, found.moving)
         admissible = is_admissible(least, profiles.v, profiles.yaw_rate, robot)
         badness = jnp.where(found.static > 0, -found.contact_time, 1e3 - found.static)
-    return _Judged(profiles.v, profiles.yaw_rate, found.end, clearance, admissible, found, badness)
+    return Judged(profiles.v, profiles.yaw_rate, found.end, clearance, admissible, found, badness)
 
 
 def candidate_profiles(state: RobotState, constants: Constants, options: Options) -> Profiles:
@@ -203,7 +230,7 @@ def brake_and_turn(state: RobotState, v: jax.Array, yaw_rate: jax.Array, local_t
     return jnp.clip(0.0, v[0], v[-1]), jnp.clip(turn, yaw_rate[0], yaw_rate[-1])
 
 
-def _otherwise(state: RobotState, judged: _Judged, guidance: Guidance, constants: Constants,
+def _otherwise(state: RobotState, judged: Judged, guidance: Guidance, constants: Constants,
                options: Options) -> tuple[jax.Array, jax.Array]:
     """The command where no candidate is admissible."""
     robot, dt = constants.robot, constants.behaviour.dt
@@ -214,7 +241,7 @@ def _otherwise(state: RobotState, judged: _Judged, guidance: Guidance, constants
     return brake_and_turn(state, v, yaw_rate, guidance.local_target, dt)
 
 
-def _terms(state: RobotState, judged: _Judged, guidance: Guidance, constants: Constants, options: Options) -> Terms:
+def _terms(state: RobotState, judged: Judged, guidance: Guidance, constants: Constants, options: Options) -> Terms:
     rules, behaviour, end, shape = options.rules, constants.behaviour, judged.end, judged.clearance.shape
     # Beyond the paper a candidate may be admissible and yet end in an obstacle: no clearance, rather than less.
     clearance = judged.clearance if judged.prediction is None else jnp.maximum(judged.clearance, 0.0)

@@ -197,7 +197,7 @@ def distance_to_squares(grid: Grid, point: jax.Array, reach: int) -> jax.Array:
     off_map = ((rows < 0) | (rows >= grid.height))[:, None] | ((columns < 0) | (columns >= grid.width))[None, :]
     block = grid.occupied.at[rows[:, None], columns[None, :]].get(mode="fill", fill_value=True)
     distance = jnp.sqrt(dy[:, None] * dy[:, None] + dx[None, :] * dx[None, :])
-    nearest = jnp.min(jnp.where(block | off_map, distance, jnp.inf))
+    nearest = lax.reduce(jnp.where(block | off_map, distance, jnp.inf), jnp.float32(jnp.inf), lesser, (0, 1))
     return jnp.where(nearest <= reach, nearest * grid.resolution, jnp.inf)
 
 

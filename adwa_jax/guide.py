@@ -47,7 +47,7 @@ def next_target(target: jax.Array, position: jax.Array, points: jax.Array, count
 
     def cond_fun(index: jax.Array) -> jax.Array:
         offset = points[index] - position
-        return (index < count - 1) & (jnp.sum(offset * offset) <= tolerance * tolerance)
+        return (index < count - 1) & (offset[0] * offset[0] + offset[1] * offset[1] <= tolerance * tolerance)
 
     return lax.while_loop(cond_fun, lambda index: index + 1, target)
 

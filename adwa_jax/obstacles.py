@@ -98,7 +98,7 @@ def sense(squares: UnknownSquares, known: jax.Array, movers: Movers, states: Mov
     to_square = _distance_to_square(position[0], position[1], squares.centre.T, squares.half_width,
                                     squares.rounding)
     offset = states.position - position[None, :]
-    to_mover = jnp.sqrt(jnp.sum(offset * offset, axis=1)) - movers.radius
+    to_mover = jnp.sqrt(offset[:, 0] * offset[:, 0] + offset[:, 1] * offset[:, 1]) - movers.radius
     return Sensed(
         square_centre=squares.centre,
         square_half_width=squares.half_width,
@@ -130,13 +130,17 @@ def _first_of(sensed: jax.Array) -> jax.Array:
 
 def _in_front(sensed: jax.Array, *fields: jax.Array) -> list[jax.Array]:
     """Rows of each field that are sensed, then rows of 0."""
-    place = jnp.cumsum(sensed) - 1
-    goes_to = sensed[None, :] & (place[None, :] == jnp.arange(sensed.shape[0])[:, None])  # [to, from]
-    def moved(field: jax.Array) -> jax.Array:
-        return jnp.sum(jnp.where(goes_to, field[None, :], 0.0), axis=1)
+    if not sensed.size:
+        return list(fields)
+    row = jnp.arange(sensed.shape[0], dtype=jnp.int32)
+    place = jnp.sum(sensed[None, :] & (row[None, :] < row[:, None]), axis=1, dtype=jnp.int32)
+    goes_to = sensed[None, :] & (place[None, :] == row[:, None])  # [to, from]
+    origin, filled = jnp.sum(jnp.where(goes_to, row[None, :], 0), axis=1), _first_of(sensed)
 
-    return [moved(field) if field.ndim == 1 else jnp.stack([moved(field[:, 0]), moved(field[:, 1])], axis=1)
-            for field in fields]  # fmt: skip
+    def moved(field: jax.Array) -> jax.Array:
+        return jnp.where(filled.reshape((-1,) + (1,) * (field.ndim - 1)), field[origin], 0.0)
+
+    return [moved(field) for field in fields]
 
 
 def clearance_to_squares(sensed: Sensed, x: jax.Array, y: jax.Array) -> jax.Array:

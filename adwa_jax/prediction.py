@@ -165,10 +165,14 @@ def _shape(v: jax.Array, arc: Arcs) -> tuple[int, int]:
 def _least_root(squared: tuple, counts: jax.Array, radius: jax.Array, least: jax.Array) -> jax.Array:
     """`least`, or the distance less `radius` to one of the obstacles that count. counts, radius: [BLOCK]."""
     for place, square in enumerate(squared):
-        positive = square > 0  # the root of 0 has no gradient
-        distance = jnp.where(positive, jnp.sqrt(jnp.where(positive, square, 1.0)), 0.0) - radius[place]
-        least = jnp.minimum(least, jnp.where(counts[place], distance, NOWHERE))
+        least = jnp.where(counts[place], least_root(square, radius[place], least), least)
     return least
+
+
+def least_root(square: jax.Array, radius: jax.Array, least: jax.Array) -> jax.Array:
+    """`least`, or the root of `square` less `radius` where that is less."""
+    positive = square > 0  # the root of 0 has no gradient
+    return jnp.minimum(least, jnp.where(positive, jnp.sqrt(jnp.where(positive, square, 1.0)), 0.0) - radius)
 
 
 def predict(state: RobotState, profiles: Profiles, horizon: int, stride: int, field: DistanceField, sensed: Sensed,

@@ -58,7 +58,7 @@ def arcs(heading: jax.Array, yaw_rate: jax.Array, dt: Scalar, steps: int) -> Arc
     """The K = `steps` points after each Euler step (eq. 7) for N yaw rates, per unit of speed.
 
     Σ v·cosθ·dt = v · Σ cosθ·dt: all speeds share the sums. Headings are turned step by step, which takes one sine and
-    cosine a yaw rate. Unbatched. heading [rad], dt [s]: []; yaw_rate: [N] [rad/s].
+    cosine a yaw rate. Unbatched. yaw_rate: [N] [rad/s]; heading [rad], dt [s]: [], or [N] as of robots side by side.
     """
     turn_cosine, turn_sine = jnp.cos(yaw_rate * dt), jnp.sin(yaw_rate * dt)
 
@@ -72,6 +72,7 @@ def arcs(heading: jax.Array, yaw_rate: jax.Array, dt: Scalar, steps: int) -> Arc
     begin = nothing, nothing, jnp.cos(heading) + nothing, jnp.sin(heading) + nothing
     _, (reach_x, reach_y) = lax.scan(body_fun, begin, None, length=steps)
     count = jnp.arange(1, steps + 1, dtype=jnp.float32)[:, None]
+    heading, dt = (jnp.broadcast_to(value, yaw_rate.shape)[None, :] for value in (heading, dt))
     return Arcs(reach_x, reach_y, heading + count * yaw_rate[None, :] * dt)
 
 

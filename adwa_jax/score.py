@@ -12,6 +12,7 @@ import jax.numpy as jnp
 
 from adwa_jax.checks import require_numbers
 from adwa_jax.grid import Scalar
+from adwa_jax.native import largest, total
 from adwa_jax.rollout import RobotState, wrap
 
 Normalisation = Literal["sum", "minmax", "none"]
@@ -177,13 +178,13 @@ def weighted_sum(terms: Terms, weights: ScoreWeights) -> jax.Array:
 
 
 def _over_sum(term: jax.Array, admissible: jax.Array) -> jax.Array:
-    total = jnp.sum(jnp.where(admissible, term, 0.0))
-    return jnp.where(total != 0, term / jnp.where(total != 0, total, 1.0), 0.0)
+    over_all = total(jnp.where(admissible, term, 0.0))
+    return jnp.where(over_all != 0, term / jnp.where(over_all != 0, over_all, 1.0), 0.0)
 
 
 def _over_range(term: jax.Array, admissible: jax.Array) -> jax.Array:
-    least = jnp.min(jnp.where(admissible, term, jnp.inf))
-    span = jnp.max(jnp.where(admissible, term, -jnp.inf)) - least
+    least = -largest(jnp.where(admissible, -term, -jnp.inf))
+    span = largest(jnp.where(admissible, term, -jnp.inf)) - least
     distinct = jnp.isfinite(span) & (span > 1e-12)
     return jnp.where(distinct, (term - jnp.where(distinct, least, 0.0)) / jnp.where(distinct, span, 1.0), 0.0)
 

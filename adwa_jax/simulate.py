@@ -1,5 +1,7 @@
 """The integrated algorithm in closed loop (§4): sense, pick the local target, DWA, move, move the obstacles, judge."""
 
+from typing import NamedTuple
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -7,7 +9,7 @@ from jax import lax
 
 from adwa_jax.astar import Status
 from adwa_jax.constants import Constants, Options
-from adwa_jax.dwa import Decision, decide
+from adwa_jax.dwa import Decision, Guidance, decide
 from adwa_jax.episode import RUNNING, Episode, EpisodeState, Outcome, position_of, sensed_now
 from adwa_jax.guide import guide, is_lost, local_target, notices
 from adwa_jax.judge import finish_episode, judge
@@ -18,6 +20,16 @@ from adwa_jax.plan import Plan
 from adwa_jax.rollout import Pose, RobotState, euler_step, wrap
 from adwa_jax.scenario import Scenario
 from adwa_jax.score import turn_towards
+
+
+class Outlook(NamedTuple):
+    """What the robot knows when it decides, and where to."""
+
+    known: jax.Array  # [S] bool, squares sensed so far
+    sensed: Sensed
+    target: jax.Array  # [] int32, index of the route's point that is headed for
+    guidance: Guidance
+    in_sight: jax.Array  # [] bool: a place of the route
 
 
 def drive(scenario: Scenario, plan: Plan, constants: Constants, options: Options) -> Episode:
@@ -88,24 +100,36 @@ def control_step(state: EpisodeState, memory: Memory, scenario: Scenario, plan: 
 
     most: no fewer squares and movers, [] int32 each, than are sensed of either; None: as many as are.
     """
-    behaviour = constants.behaviour
+    outlook = look(state, memory, scenario, plan, constants, options, most)
+    decision = decide(state.robot, outlook.guidance, field_of(memory, plan), outlook.sensed, constants, options)
+    return act(state, decision, outlook, memory, scenario, plan, constants, options), decision
+
+
+def look(state: EpisodeState, memory: Memory, scenario: Scenario, plan: Plan, constants: Constants, options: Options,
+         most: tuple[jax.Array, jax.Array] | None = None) -> Outlook:
+    """Sense and pick the target; most: as for `control_step`."""
     as_listed = sensed_now(state, scenario, constants, options)
     squares, movers = most_sensed(as_listed) if most is None else most
     sensed = sensed_first(as_listed)._replace(square_count=squares, mover_count=movers)
-    field = field_of(memory, plan)
-    target, guidance, in_sight = guide(state, memory, scenario, plan, field, sensed, constants, options)
-    decision = decide(state.robot, guidance, field, sensed, constants, options)
+    guided = guide(state, memory, scenario, plan, field_of(memory, plan), sensed, constants, options)
+    return Outlook(as_listed.square_known, sensed, *guided)
+
+
+def act(state: EpisodeState, decision: Decision, outlook: Outlook, memory: Memory, scenario: Scenario, plan: Plan,
+        constants: Constants, options: Options) -> EpisodeState:
+    """Move robot and movers, and judge."""
+    behaviour = constants.behaviour
     pose = Pose(state.robot.x, state.robot.y, state.robot.heading)
     moved = euler_step(pose, decision.v, decision.yaw_rate, behaviour.dt)
     robot = RobotState(moved.x, moved.y, wrap(moved.heading), decision.v, decision.yaw_rate)
     state = state._replace(
         robot=robot,
         step=state.step + 1,
-        target=target,
-        target_point=guidance.local_target,
-        known=as_listed.square_known,
+        target=outlook.target,
+        target_point=outlook.guidance.local_target,
+        known=outlook.known,
         brakings=state.brakings + (decision.index < 0).astype(jnp.int32),
-        lost=jnp.where(in_sight, 0, state.lost + 1),
+        lost=jnp.where(outlook.in_sight, 0, state.lost + 1),
     )
-    state = judge(state, pose, scenario, field, constants, options)
-    return state._replace(noticed=notices(state, memory, scenario, constants, options)), decision
+    state = judge(state, pose, scenario, field_of(memory, plan), constants, options)
+    return state._replace(noticed=notices(state, memory, scenario, constants, options))

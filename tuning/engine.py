@@ -29,8 +29,9 @@ from tuning.compiled import keep_compiled
 from tuning.plans_ahead import Pair, Planner, planned_by
 
 FINEST_SPACING = 0.1  # [m]; the distance field is no finer, however many lattice steps a cell the options ask for
-# Side of the map [cells] up to which a worker has so many lanes: what they hold should stay in the cache.
-LANES = ((128, 64), (256, 16), (512, 8))
+# Side of the map [cells] up to which a worker has so many lanes: enough for whole vectors, few because what they hold
+# should stay in the cache, and because lanes without work, as there are at the end, cost as much as those with it.
+LANES = ((256, 16), (512, 8))
 FEWEST_LANES = 4
 FILLED_AT_ONCE = 4  # lanes that one call fills
 LOOK = 0.2  # [s] between two looks at how far the work is
@@ -207,7 +208,7 @@ def _work(queue: _Queue, options: Options, width: int, table: _Table) -> None:
             taken = queue.take(len(places))
             if not taken:
                 break
-            lanes = _with(lanes, [task for _, task in taken], places[: len(taken)], width)
+            lanes = _with(lanes, [task for _, task in taken], places[: len(taken)], options, width)
             held |= dict(zip(places, (pair for pair, _ in taken), strict=False))
         if lanes is None or not held:
             return
@@ -216,9 +217,9 @@ def _work(queue: _Queue, options: Options, width: int, table: _Table) -> None:
         lanes = moved
 
 
-def _with(lanes: Lanes | None, tasks: list[Task], places: list[int], width: int) -> Lanes:
+def _with(lanes: Lanes | None, tasks: list[Task], places: list[int], options: Options, width: int) -> Lanes:
     """The lanes with new episodes; idle ones are made first if there are none yet."""
-    lanes = _idle(tasks[0], width) if lanes is None else lanes
+    lanes = _idle(tasks[0], options, width) if lanes is None else lanes
     missing = FILLED_AT_ONCE - len(tasks)
     rows = jax.tree.map(lambda *leaves: np.stack(leaves), *tasks, *tasks[:1] * missing)
     return _fill(lanes, rows, np.array(places + [0] * missing, np.int32), np.int32(len(tasks)))
@@ -242,9 +243,9 @@ def driven_columns(episodes: Episode) -> dict[str, Any]:
             "brakings": episodes.brakings, "replans": episodes.replans, **episodes.measures._asdict()}  # fmt: skip
 
 
-@partial(jax.jit, static_argnames="width")
-def _idle(task: Task, width: int) -> Lanes:
-    return idle_lanes(task, width)
+@partial(jax.jit, static_argnames=("options", "width"))
+def _idle(task: Task, options: Options, width: int) -> Lanes:
+    return idle_lanes(task, options, width)
 
 
 @partial(jax.jit, donate_argnames="lanes")
