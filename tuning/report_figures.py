@@ -99,7 +99,7 @@ def front_figure(findings: Findings, training: Evaluations | None = None) -> "Fi
 def parallel_figure(findings: Findings, ax: "Axes | None" = None) -> "Figure":
     """Parallel coordinates: one line a member of the front through its constants and its objectives on training.
 
-    Each axis runs over what is shown; the shade is the first objective.
+    Each axis runs over what is shown; the shade is the first objective in which they differ.
     """
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
@@ -113,9 +113,10 @@ def parallel_figure(findings: Findings, ax: "Axes | None" = None) -> "Figure":
         ax = new_figure((max(0.62 * len(names) + 1.6, 5.0), 4.6)).subplots()
     low, high = np.nanmin(table, axis=0), np.nanmax(table, axis=0)
     lines = np.where(high > low, (table - low) / np.where(high > low, high - low, 1.0), 0.5)
-    first = table[:, len(findings.parameters)]
-    shades = ScalarMappable(Normalize(np.nanmin(first), np.nanmax(first)), COLOURS)
-    for line, value in zip(lines[:-1], first[:-1], strict=True):
+    shade = int(np.argmax((high > low)[len(findings.parameters) :]))
+    shaded = table[:, len(findings.parameters) + shade]
+    shades = ScalarMappable(Normalize(np.nanmin(shaded), np.nanmax(shaded)), COLOURS)
+    for line, value in zip(lines[:-1], shaded[:-1], strict=True):
         ax.plot(line, color=shades.to_rgba(value), linewidth=1.2, alpha=0.8, zorder=2)
     ax.plot(lines[-1], color=BLACK, linewidth=1.8, linestyle="--", zorder=3, label="default constants")
     best = lines[findings.choices[findings.recommended].member]
@@ -123,7 +124,7 @@ def parallel_figure(findings: Findings, ax: "Axes | None" = None) -> "Figure":
     ax.plot(best, linewidth=2.4, zorder=4, label="recommended", **style)
     _dress_parallel(ax, names, low, high, len(findings.parameters))
     bar = figure_of(ax).colorbar(shades, ax=ax, pad=0.01, shrink=0.8)
-    bar.set_label(axis_label(objectives[0]), fontsize=FONT)
+    bar.set_label(axis_label(objectives[shade]), fontsize=FONT)
     bar.ax.tick_params(labelsize=FONT - 1)
     figure_legend(figure_of(ax), [ax])
     return figure_of(ax)
