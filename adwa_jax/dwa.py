@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 from jax import lax
 
-from adwa_jax.admissible import halts_clear, is_admissible
+from adwa_jax.admissible import halts_clear, is_admissible, room_to_stop
 from adwa_jax.constants import Constants, Options
 from adwa_jax.grid import DistanceField, Scalar
 from adwa_jax.obstacles import Sensed
@@ -70,7 +70,7 @@ class Decision(NamedTuple):
     candidates: Candidates
 
 
-class _Judged(NamedTuple):
+class Judged(NamedTuple):
     """What is known of the candidates before they are scored."""
 
     v: jax.Array  # [V]
@@ -80,6 +80,7 @@ class _Judged(NamedTuple):
     admissible: jax.Array  # [V, N] bool
     prediction: Prediction | None  # None: the paper's arcs
     badness: jax.Array  # [V, N], least for the least bad
+    margin: jax.Array  # [V, N] [m], ≥ 0 where admissible, but for ties: how far from the edge of that
 
 
 def decide(state: RobotState, guidance: Guidance, field: DistanceField, sensed: Sensed, constants: Constants,
@@ -91,24 +92,30 @@ def decide(state: RobotState, guidance: Guidance, field: DistanceField, sensed: 
 
     Unbatched. No NaN for finite input.
     """
-    rules = options.rules
-    beyond = any([rules.ramp, rules.second_phase, rules.reverse, rules.stopping, rules.long_watch, rules.mover_terms,
-                  rules.mover_margin, len(constants.robot.disc_offsets) > 1])  # fmt: skip
-    judged = (_judged_beyond if beyond else _judged_as_printed)(state, field, sensed, constants, options)
-    terms = _terms(state, judged, guidance, constants, options)
-    score = weighted_sum(normalise(terms, judged.admissible, _scales(constants, options), options.dwa.normalisation),
+    judged = judged_candidates(state, field, sensed, constants, options)
+    terms = terms_of(state, judged, guidance, constants, options)
+    score = weighted_sum(normalise(terms, judged.admissible, scales_of(constants, options), options.dwa.normalisation),
                          constants.weights)
     candidates = Candidates(judged.v, judged.yaw_rate, judged.clearance, judged.admissible, terms, score)
     best = _first_largest(jnp.where(judged.admissible, score, -jnp.inf))
     moves = jnp.any(judged.admissible)
     width = judged.yaw_rate.shape[0]
-    otherwise = _otherwise(state, judged, guidance, constants, options)
+    otherwise = last_resort(state, judged, guidance, constants, options)
     return Decision(
         v=jnp.where(moves, judged.v[best // width], otherwise[0]),
         yaw_rate=jnp.where(moves, judged.yaw_rate[best % width], otherwise[1]),
         index=jnp.where(moves, best, -1),
         candidates=candidates,
     )
+
+
+def judged_candidates(state: RobotState, field: DistanceField, sensed: Sensed, constants: Constants,
+                      options: Options) -> Judged:
+    """Every candidate, where it leads and whether it is admissible. Unbatched."""
+    rules = options.rules
+    beyond = any([rules.ramp, rules.second_phase, rules.reverse, rules.stopping, rules.long_watch, rules.mover_terms,
+                  rules.mover_margin, len(constants.robot.disc_offsets) > 1])  # fmt: skip
+    return (_judged_beyond if beyond else _judged_as_printed)(state, field, sensed, constants, options)
 
 
 def _first_largest(values: jax.Array) -> jax.Array:
@@ -118,7 +125,7 @@ def _first_largest(values: jax.Array) -> jax.Array:
 
 
 def _judged_as_printed(state: RobotState, field: DistanceField, sensed: Sensed, constants: Constants,
-                       options: Options) -> _Judged:
+                       options: Options) -> Judged:
     """The paper's candidates: constant velocities of the window (eqs. 6 and 7), clear over the whole horizon."""
     robot, dt, dwa = constants.robot, constants.behaviour.dt, options.dwa
     v, yaw_rate = velocity_window(state.v, state.yaw_rate, robot, dt, dwa.v_samples, dwa.yaw_rate_samples)
@@ -129,11 +136,12 @@ def _judged_as_printed(state: RobotState, field: DistanceField, sensed: Sensed, 
         y=state.y + v[:, None] * arc.reach_y[-1][None, :],
         heading=arc.heading[-1][None, :],
     )
-    return _Judged(v, yaw_rate, end, clearance, is_admissible(clearance, v, yaw_rate, robot), None, -clearance)
+    return Judged(v, yaw_rate, end, clearance, is_admissible(clearance, v, yaw_rate, robot), None, -clearance,
+                  room_to_stop(clearance, v, yaw_rate, robot))
 
 
 def _judged_beyond(state: RobotState, field: DistanceField, sensed: Sensed, constants: Constants,
-                   options: Options) -> _Judged:
+                   options: Options) -> Judged:
     """Candidates as the rules make and judge them."""
     robot, behaviour, rules, dwa = constants.robot, constants.behaviour, options.rules, options.dwa
     profiles = candidate_profiles(state, constants, options)
@@ -148,13 +156,15 @@ def _judged_beyond(state: RobotState, field: DistanceField, sensed: Sensed, cons
     if rules.stopping:
         halt = halts_clear(state, profiles, field, sensed, robot, behaviour, dwa.halt_steps, rules.mover_margin, room)
         admissible = halt.clear_of_statics & (halt.moving > 0)
+        margin = jnp.minimum(halt.static - room, halt.moving)
         badness = jnp.where(halt.clear_of_statics, -found.contact_time - 0.01 * jnp.clip(halt.moving, -1.0, 1.0),
                             1e3 - halt.static)
     else:
         least = jnp.minimum(found.static, found.moving)
         admissible = is_admissible(least, profiles.v, profiles.yaw_rate, robot)
+        margin = room_to_stop(least, profiles.v, profiles.yaw_rate, robot)
         badness = jnp.where(found.static > 0, -found.contact_time, 1e3 - found.static)
-    return _Judged(profiles.v, profiles.yaw_rate, found.end, clearance, admissible, found, badness)
+    return Judged(profiles.v, profiles.yaw_rate, found.end, clearance, admissible, found, badness, margin)
 
 
 def candidate_profiles(state: RobotState, constants: Constants, options: Options) -> Profiles:
@@ -189,9 +199,9 @@ def brake_and_turn(state: RobotState, v: jax.Array, yaw_rate: jax.Array, local_t
     return jnp.clip(0.0, v[0], v[-1]), jnp.clip(turn, yaw_rate[0], yaw_rate[-1])
 
 
-def _otherwise(state: RobotState, judged: _Judged, guidance: Guidance, constants: Constants,
-               options: Options) -> tuple[jax.Array, jax.Array]:
-    """The command where no candidate is admissible."""
+def last_resort(state: RobotState, judged: Judged, guidance: Guidance, constants: Constants,
+                options: Options) -> tuple[jax.Array, jax.Array]:
+    """The command (v, yaw rate), [] each, where no candidate is admissible."""
     robot, dt = constants.robot, constants.behaviour.dt
     if options.rules.least_bad:
         index = _first_largest(-judged.badness)
@@ -200,7 +210,8 @@ def _otherwise(state: RobotState, judged: _Judged, guidance: Guidance, constants
     return brake_and_turn(state, v, yaw_rate, guidance.local_target, dt)
 
 
-def _terms(state: RobotState, judged: _Judged, guidance: Guidance, constants: Constants, options: Options) -> Terms:
+def terms_of(state: RobotState, judged: Judged, guidance: Guidance, constants: Constants, options: Options) -> Terms:
+    """The terms in use, raw, [V, N] each. Unbatched."""
     rules, behaviour, end, shape = options.rules, constants.behaviour, judged.end, judged.clearance.shape
     # Beyond the paper a candidate may be admissible and yet end in an obstacle: no clearance, rather than less.
     clearance = judged.clearance if judged.prediction is None else jnp.maximum(judged.clearance, 0.0)
@@ -235,7 +246,7 @@ def _terms(state: RobotState, judged: _Judged, guidance: Guidance, constants: Co
     return terms
 
 
-def _scales(constants: Constants, options: Options) -> Terms:
+def scales_of(constants: Constants, options: Options) -> Terms:
     """What a term is divided by under fixed scales: the most it can be, or its half-range."""
     robot, behaviour = constants.robot, constants.behaviour
     steps = _watched(options)
