@@ -92,7 +92,11 @@ def decide(state: RobotState, guidance: Guidance, field: DistanceField, sensed: 
 
     Unbatched. No NaN for finite input.
     """
-    judged = judged_candidates(state, field, sensed, constants, options)
+    return chosen(state, judged_candidates(state, field, sensed, constants, options), guidance, constants, options)
+
+
+def chosen(state: RobotState, judged: Judged, guidance: Guidance, constants: Constants, options: Options) -> Decision:
+    """`decide` among candidates already judged. Unbatched."""
     terms = terms_of(state, judged, guidance, constants, options)
     score = weighted_sum(normalise(terms, judged.admissible, scales_of(constants, options), options.dwa.normalisation),
                          constants.weights)

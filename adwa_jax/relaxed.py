@@ -12,7 +12,7 @@ import jax.numpy as jnp
 from jax import lax
 
 from adwa_jax.constants import Constants, Options
-from adwa_jax.dwa import Guidance, Judged, decide, judged_candidates, last_resort, scales_of, terms_of
+from adwa_jax.dwa import Guidance, Judged, chosen, judged_candidates, last_resort, scales_of, terms_of
 from adwa_jax.grid import DistanceField, Scalar
 from adwa_jax.obstacles import Sensed
 from adwa_jax.rollout import RobotState
@@ -55,7 +55,7 @@ def relaxed_decide(state: RobotState, guidance: Guidance, field: DistanceField, 
     v = moves * jnp.sum(share * judged.v[:, None]) + (1.0 - moves) * otherwise[0]
     yaw_rate = moves * jnp.sum(share * judged.yaw_rate[None, :]) + (1.0 - moves) * otherwise[1]
     if variant == "straight_through":
-        hard = lax.stop_gradient(decide(state, guidance, field, sensed, constants, options))
+        hard = lax.stop_gradient(chosen(state, judged, guidance, constants, options))
         v, yaw_rate = hard.v + (v - lax.stop_gradient(v)), hard.yaw_rate + (yaw_rate - lax.stop_gradient(yaw_rate))
     return RelaxedDecision(v, yaw_rate, share, moves)
 
