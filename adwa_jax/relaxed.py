@@ -25,7 +25,7 @@ LEAST_TOTAL = 1e-4  # a term whose sum is nearer to 0 says nothing
 class Softness(NamedTuple):
     """How soft a decision is, [] float32 each, above 0. Traced."""
 
-    temperature: Scalar = 0.02  # of the softmax, in units of the score (a term's mean, or its scale; Σ weights = 1)
+    temperature: Scalar = 0.03  # of the softmax, in units of the score (a term's mean, or its scale; Σ weights = 1)
     margin: Scalar = 0.05  # over which a candidate turns admissible, and clearance reaches its cap [m]
 
 

@@ -17,8 +17,8 @@ from adwa_jax.constants import Constants, Options
 from adwa_jax.episode import RUNNING, EpisodeState, sensed_now
 from adwa_jax.grid import DistanceField, Scalar
 from adwa_jax.guide import guide
-from adwa_jax.lanes import Lanes, advanced
-from adwa_jax.learn import Memory, field_of
+from adwa_jax.lanes import Lanes, Task, advanced
+from adwa_jax.learn import Memory, field_of, first_memory
 from adwa_jax.obstacles import Sensed, movers_at
 from adwa_jax.plan import Plan
 from adwa_jax.prediction import mover_clearance, static_clearance
@@ -26,6 +26,7 @@ from adwa_jax.relaxed import Softness, Variant, relaxed_decide
 from adwa_jax.rollout import Pose, RobotState, euler_step, wrap
 from adwa_jax.route import ahead_of, foot_on
 from adwa_jax.scenario import Scenario
+from adwa_jax.simulate import start_episode
 
 COMFORT = 0.3
 """Clearance below which a step counts as too near [m]: more than twice what is a danger point."""
@@ -64,11 +65,13 @@ class OnTheWay(NamedTuple):
     memory: Memory
 
 
-def recorded(lanes: Lanes, options: Options, every: int, count: int) -> OnTheWay:
-    """The lanes' hard episodes as they stand before the first step and after each `every` more: [B, P = count, ...].
+def recorded(tasks: Task, options: Options, every: int, count: int) -> OnTheWay:
+    """B hard episodes as they stand before the first step and after each `every` more: [B, P = count, ...].
 
-    An episode that has ended stays as it ended; its outcome tells.
+    An episode that has ended stays as it ended; its outcome tells. tasks: a leading axis B on everything.
     """
+    lanes = Lanes(jax.vmap(start_episode)(tasks.scenario, tasks.plan),
+                  jax.vmap(first_memory)(tasks.scenario, tasks.plan), tasks)  # fmt: skip
 
     def body_fun(lanes: Lanes, _: None) -> tuple[Lanes, OnTheWay]:
         return advanced(lanes, options, every), OnTheWay(lanes.state, lanes.memory)
