@@ -20,13 +20,14 @@ from adwa_jax.score import Normalisation, ScoreWeights, Terms, normalise, weight
 
 Variant = Literal["smooth", "straight_through"]
 LEAST_TOTAL = 1e-4  # a term whose sum is nearer to 0 says nothing
+BARRIER = 0.1  # of the score, for each unit of log admissibility: scores of the candidates lie about so far apart
 
 
 class Softness(NamedTuple):
     """How soft a decision is, [] float32 each, above 0. Traced."""
 
     temperature: Scalar = 0.03  # of the softmax, in units of the score (a term's mean, or its scale; Σ weights = 1)
-    margin: Scalar = 0.05  # over which a candidate turns admissible, and clearance reaches its cap [m]
+    margin: Scalar = 0.02  # over which a candidate turns admissible, and clearance reaches its cap [m]
 
 
 class RelaxedDecision(NamedTuple):
@@ -40,7 +41,7 @@ class RelaxedDecision(NamedTuple):
 
 def relaxed_decide(state: RobotState, guidance: Guidance, field: DistanceField, sensed: Sensed, constants: Constants,
                    softness: Softness, options: Options, variant: Variant) -> RelaxedDecision:
-    """The mean command under shares = softmax(score / temperature + log sigmoid(margin / softness.margin)).
+    """The mean command under shares = softmax((score + BARRIER · log sigmoid(margin / softness.margin)) / temperature).
 
     `smooth` commands that mean; `straight_through` commands what `decide` does and has the gradient of the mean.
     `sensed` must not be counted (`Sensed.square_count`): loops of unknown length have no gradient. Unbatched. No NaN
@@ -49,7 +50,7 @@ def relaxed_decide(state: RobotState, guidance: Guidance, field: DistanceField, 
     judged = judged_candidates(state, field, sensed, constants, options)
     log_admissible = jax.nn.log_sigmoid(judged.margin / softness.margin)
     score = _score(state, judged, guidance, log_admissible, constants, softness, options)
-    share = jax.nn.softmax((score / softness.temperature + log_admissible).reshape(-1)).reshape(score.shape)
+    share = jax.nn.softmax((score + BARRIER * log_admissible) / softness.temperature, axis=(0, 1))
     moves = jnp.exp(jnp.max(log_admissible))
     otherwise = last_resort(state, judged, guidance, constants, options)
     v = moves * jnp.sum(share * judged.v[:, None]) + (1.0 - moves) * otherwise[0]

@@ -23,7 +23,7 @@ from tests.test_tuning.worlds import OPEN, drawn
 OPTIONS = Options(plan=PlanOptions(subdivision=2), dwa=DwaOptions(v_samples=5, yaw_rate_samples=7, horizon_steps=6))
 NAMES = ("local_heading", "clearance", "velocity", "global_heading")
 CONSTANTS: Constants = jax.tree.map(jnp.float32, paper().constants)
-SOFT, SHARP = Softness(jnp.float32(0.03), jnp.float32(0.05)), Softness(jnp.float32(1e-6), jnp.float32(1e-6))
+SOFT, SHARP = Softness(jnp.float32(0.03), jnp.float32(0.02)), Softness(jnp.float32(1e-6), jnp.float32(1e-6))
 WALLED = field_of(grid_of(np.ones((12, 12), bool)), subdivision=SUBDIVISION)
 
 hard = jax.jit(decide, static_argnames="options")

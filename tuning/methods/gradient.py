@@ -193,11 +193,11 @@ def _smoothed(problem: Problem, settings: Settings, points: np.ndarray, weights:
               random: np.random.Generator) -> np.ndarray:
     """[B, S, D] smoothed gradients in the parameters that only planning depends on; 0 in the others."""
     names = problem.space.names
-    return np.stack([
-        planned_slopes(problem.space, problem.goals, point, row, scenarios, settings.es_pairs, settings.es_scale, random)
-        if any(name in PLANNED for name in names) else np.zeros((len(scenarios), len(names)))
-        for point, row in zip(points, weights, strict=True)
-    ])  # fmt: skip
+    if not any(name in PLANNED for name in names):
+        return np.zeros((len(points), len(scenarios), len(names)))
+    return np.stack([planned_slopes(problem.space, problem.goals, point, row, scenarios, settings.es_pairs,
+                                    settings.es_scale, random)
+                     for point, row in zip(points, weights, strict=True)])  # fmt: skip
 
 
 def planned_slopes(space: Space, goals: Goals, point: np.ndarray, weights: np.ndarray, scenarios: list, pairs: int,
