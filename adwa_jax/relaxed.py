@@ -92,7 +92,8 @@ def _normalised(terms: Terms, judged: Judged, log_admissible: jax.Array, scales:
         says = jnp.abs(total) > LEAST_TOTAL
         return jnp.where(says, term * (jnp.sum(counts) / jnp.where(says, total, 1.0)), 0.0)
 
-    return Terms(*(term if term is None else over_mean(term) for term in terms))
+    used = {name: over_mean(term) for name, term in terms._asdict().items() if term is not None}
+    return Terms(**used)
 
 
 def _total(weights: ScoreWeights, terms: Terms) -> jax.Array:

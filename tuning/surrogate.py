@@ -78,6 +78,7 @@ def surrogate(space: Space, unit: np.ndarray, weights: np.ndarray, rows: Sequenc
     columns = [index for index, name in enumerate(space.names) if driven(name)]
     axes = tuple(_Axis(space.names[index], space.parameters[index].scale == "log") for index in columns)
     bounds = np.array([[space.parameters[index].low, space.parameters[index].high] for index in columns], np.float32)
+    softness = Softness(*(jnp.float32(value) for value in softness))
     for part in rows:
         at = np.array([pair.candidate for pair in part.pairs])
         filled = np.concatenate([at, np.repeat(at[-1:], ROWS - len(at))])

@@ -173,7 +173,7 @@ def _relaxed(problem: Problem, settings: Settings, points: np.ndarray, weights: 
         taken = np.sort(random.choice(len(problem.suite.scenarios), count, replace=False))
         scenarios = [problem.suite.scenarios[index] for index in taken]
         look = Look(Stretch(settings.stretch, settings.truncate, settings.variant), settings.stretches, settings.every)
-        rows, softness = record(problem.space, points, scenarios, look), Softness(np.float32(settings.temperature))
+        rows, softness = record(problem.space, points, scenarios, look), Softness(settings.temperature)
         optimiser = optax.adam(settings.learning_rate)
         at, path, first = points, [], None
         state = optimiser.init(jnp.asarray(points))
