@@ -11,6 +11,7 @@ Dimension letters: B starts; D parameters; O objectives; P pairs of probes; S sc
 from collections.abc import Mapping
 from typing import Literal
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import optax
@@ -176,12 +177,13 @@ def _relaxed(problem: Problem, settings: Settings, points: np.ndarray, weights: 
         rows, softness = record(problem.space, points, scenarios, look), Softness(settings.temperature)
         optimiser = optax.adam(settings.learning_rate)
         at, path, first = points, [], None
-        state = optimiser.init(jnp.asarray(points))
+        state = optimiser.init(jnp.asarray(points, jnp.float32))
         for _ in range(settings.steps):
             each = surrogate(problem.space, at, loss_weights(problem.goals, weights), rows, look, softness)[1]
             each = each + _smoothed(problem, settings, at, weights, scenarios, random)
             first = each if first is None else first
-            updates, state = optimiser.update(jnp.asarray(each.mean(axis=1)), state)
+            with jax.numpy_dtype_promotion("standard"):  # optax raises numbers to whole powers
+                updates, state = optimiser.update(jnp.asarray(each.mean(axis=1), jnp.float32), state)
             at = np.clip(at + np.asarray(updates, np.float64), 0.0, 1.0)
             path.append(at)
         return {"path": np.stack(path, axis=1), "each": np.asarray(first)}
