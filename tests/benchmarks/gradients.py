@@ -48,7 +48,7 @@ def _weights(random: np.random.Generator) -> np.ndarray:
 
 
 def _softness(random: np.random.Generator) -> Softness:
-    return Softness(np.float32(10.0 ** random.uniform(-3, 1)), np.float32(10.0 ** random.uniform(-3, 0)))
+    return Softness(jnp.float32(10.0 ** random.uniform(-3, 1)), jnp.float32(10.0 ** random.uniform(-3, 0)))
 
 
 def _moved(part: Recorded, random: np.random.Generator) -> OnTheWay:
@@ -80,4 +80,4 @@ def _finite(task, way: OnTheWay, weights: jax.Array, softness: Softness, options
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:2], *map(int, sys.argv[2:3]))
+    main((sys.argv[1:2] or ["paper"])[0], int((sys.argv[2:3] or [10_000])[0]))
