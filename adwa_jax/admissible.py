@@ -33,6 +33,12 @@ def is_admissible(clearance: jax.Array, v: jax.Array, yaw_rate: jax.Array, robot
     return (clearance > 0) & stops
 
 
+def room_to_stop(clearance: jax.Array, v: jax.Array, yaw_rate: jax.Array, robot: RobotLimits) -> jax.Array:
+    """[V, N] clearance less what it takes to stop [m]: the same rule as a length, below 0 where it is broken."""
+    braking = (v * v)[:, None] / (2.0 * robot.brake)
+    return clearance - jnp.maximum(braking, (yaw_rate * yaw_rate)[None, :] / (2.0 * robot.yaw_brake))
+
+
 def halts_clear(state: RobotState, profiles: Profiles, field: DistanceField, sensed: Sensed, robot: RobotLimits,
                 behaviour: Behaviour, steps: int, growing_margin: bool, room: jax.Array,
                 begins: Begins | None = None) -> Halt:

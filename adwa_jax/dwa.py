@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 from jax import lax
 
-from adwa_jax.admissible import halts_clear, is_admissible
+from adwa_jax.admissible import halts_clear, is_admissible, room_to_stop
 from adwa_jax.constants import Constants, Options
 from adwa_jax.grid import DistanceField, Scalar
 from adwa_jax.native import folded
@@ -83,6 +83,7 @@ class Judged(NamedTuple):
     admissible: jax.Array  # [V, N] bool
     prediction: Prediction | None  # None: the paper's arcs
     badness: jax.Array  # [V, N], least for the least bad
+    margin: jax.Array  # [V, N] [m], ≥ 0 where admissible, but for ties: how far from the edge of that
 
 
 def decide(state: RobotState, guidance: Guidance, field: DistanceField, sensed: Sensed, constants: Constants,
@@ -94,8 +95,7 @@ def decide(state: RobotState, guidance: Guidance, field: DistanceField, sensed: 
 
     Unbatched. No NaN for finite input.
     """
-    judge = _judged_as_printed if as_printed(constants, options) else _judged_beyond
-    return chosen(state, judge(state, field, sensed, constants, options), guidance, constants, options)
+    return chosen(state, judged_candidates(state, field, sensed, constants, options), guidance, constants, options)
 
 
 def as_printed(constants: Constants, options: Options) -> bool:
@@ -105,16 +105,23 @@ def as_printed(constants: Constants, options: Options) -> bool:
                     rules.mover_margin, len(constants.robot.disc_offsets) > 1])  # fmt: skip
 
 
+def judged_candidates(state: RobotState, field: DistanceField, sensed: Sensed, constants: Constants,
+                      options: Options) -> Judged:
+    """The first half of `decide`: every candidate, where it leads and whether it is admissible. Unbatched."""
+    judge = _judged_as_printed if as_printed(constants, options) else _judged_beyond
+    return judge(state, field, sensed, constants, options)
+
+
 def chosen(state: RobotState, judged: Judged, guidance: Guidance, constants: Constants, options: Options) -> Decision:
-    """The second half of `decide`: scores the candidates and picks one."""
-    terms = _terms(state, judged, guidance, constants, options)
-    score = weighted_sum(normalise(terms, judged.admissible, _scales(constants, options), options.dwa.normalisation),
+    """The second half of `decide`: scores the candidates and picks one. Unbatched."""
+    terms = terms_of(state, judged, guidance, constants, options)
+    score = weighted_sum(normalise(terms, judged.admissible, scales_of(constants, options), options.dwa.normalisation),
                          constants.weights)
     candidates = Candidates(judged.v, judged.yaw_rate, judged.clearance, judged.admissible, terms, score)
     best = _first_largest(jnp.where(judged.admissible, score, -jnp.inf))
     moves = jnp.any(judged.admissible)
     width = judged.yaw_rate.shape[0]
-    otherwise = _otherwise(state, judged, guidance, constants, options)
+    otherwise = last_resort(state, judged, guidance, constants, options)
     return Decision(
         v=jnp.where(moves, judged.v[best // width], otherwise[0]),
         yaw_rate=jnp.where(moves, judged.yaw_rate[best % width], otherwise[1]),
@@ -158,7 +165,8 @@ def judged_by_clearance(state: RobotState, v: jax.Array, yaw_rate: jax.Array, la
         y=state.y + v[:, None] * last.reach_y[None, :],
         heading=last.heading[None, :],
     )
-    return Judged(v, yaw_rate, end, clearance, is_admissible(clearance, v, yaw_rate, robot), None, -clearance)
+    return Judged(v, yaw_rate, end, clearance, is_admissible(clearance, v, yaw_rate, robot), None, -clearance,
+                  room_to_stop(clearance, v, yaw_rate, robot))
 
 
 def _judged_beyond(state: RobotState, field: DistanceField, sensed: Sensed, constants: Constants,
@@ -178,13 +186,15 @@ def _judged_beyond(state: RobotState, field: DistanceField, sensed: Sensed, cons
         halt = halts_clear(state, profiles, field, sensed, robot, behaviour, dwa.halt_steps, rules.mover_margin, room,
                            begins_of(options))
         admissible = halt.clear_of_statics & (halt.moving > 0)
+        margin = jnp.minimum(halt.static - room, halt.moving)
         badness = jnp.where(halt.clear_of_statics, -found.contact_time - 0.01 * jnp.clip(halt.moving, -1.0, 1.0),
                             1e3 - halt.static)
     else:
         least = jnp.minimum(found.static, found.moving)
         admissible = is_admissible(least, profiles.v, profiles.yaw_rate, robot)
+        margin = room_to_stop(least, profiles.v, profiles.yaw_rate, robot)
         badness = jnp.where(found.static > 0, -found.contact_time, 1e3 - found.static)
-    return Judged(profiles.v, profiles.yaw_rate, found.end, clearance, admissible, found, badness)
+    return Judged(profiles.v, profiles.yaw_rate, found.end, clearance, admissible, found, badness, margin)
 
 
 def candidate_profiles(state: RobotState, constants: Constants, options: Options) -> Profiles:
@@ -230,9 +240,9 @@ def brake_and_turn(state: RobotState, v: jax.Array, yaw_rate: jax.Array, local_t
     return jnp.clip(0.0, v[0], v[-1]), jnp.clip(turn, yaw_rate[0], yaw_rate[-1])
 
 
-def _otherwise(state: RobotState, judged: Judged, guidance: Guidance, constants: Constants,
-               options: Options) -> tuple[jax.Array, jax.Array]:
-    """The command where no candidate is admissible."""
+def last_resort(state: RobotState, judged: Judged, guidance: Guidance, constants: Constants,
+                options: Options) -> tuple[jax.Array, jax.Array]:
+    """The command (v, yaw rate), [] each, where no candidate is admissible."""
     robot, dt = constants.robot, constants.behaviour.dt
     if options.rules.least_bad:
         index = _first_largest(-judged.badness)
@@ -241,7 +251,8 @@ def _otherwise(state: RobotState, judged: Judged, guidance: Guidance, constants:
     return brake_and_turn(state, v, yaw_rate, guidance.local_target, dt)
 
 
-def _terms(state: RobotState, judged: Judged, guidance: Guidance, constants: Constants, options: Options) -> Terms:
+def terms_of(state: RobotState, judged: Judged, guidance: Guidance, constants: Constants, options: Options) -> Terms:
+    """The terms in use, raw, [V, N] each. Unbatched."""
     rules, behaviour, end, shape = options.rules, constants.behaviour, judged.end, judged.clearance.shape
     # Beyond the paper a candidate may be admissible and yet end in an obstacle: no clearance, rather than less.
     clearance = judged.clearance if judged.prediction is None else jnp.maximum(judged.clearance, 0.0)
@@ -276,7 +287,7 @@ def _terms(state: RobotState, judged: Judged, guidance: Guidance, constants: Con
     return terms
 
 
-def _scales(constants: Constants, options: Options) -> Terms:
+def scales_of(constants: Constants, options: Options) -> Terms:
     """What a term is divided by under fixed scales: the most it can be, or its half-range."""
     robot, behaviour = constants.robot, constants.behaviour
     steps = _watched(options)

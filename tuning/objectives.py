@@ -65,7 +65,7 @@ class Goals:
             statistic, sign = constraint.statistic, constraint.statistic.sign
             value = _minimised(statistic, estimate(statistic, columns, counted))
             violation = violation + np.maximum(value - sign * constraint.bound, 0.0)
-        return Scores(objectives, violation)
+        return Scores(objectives, violation, columns, counted)
 
 
 class Scores(NamedTuple):
@@ -73,6 +73,8 @@ class Scores(NamedTuple):
 
     objectives: np.ndarray  # [C, O] float64, all to be minimised, finite
     violation: np.ndarray  # [C] float64 ≥ 0; 0: all constraints hold and something was solved
+    columns: Mapping[str, np.ndarray] | None = None  # [C, S] each, what they were computed from; None: not said
+    counted: np.ndarray | None = None  # [C, S] bool
 
 
 DEFAULT_OBJECTIVES = (Statistic("success", "max"), Statistic("length_ratio", "min"),
