@@ -113,7 +113,7 @@ class _Candidates:
 
     def standing(self) -> Standing:
         """The whole front, as the rules look at it."""
-        objectives, violation = self.scores
+        objectives, violation = self.scores.objectives, self.scores.violation
         scenarios = self.evaluations.done.shape[1]
         return Standing(objectives[self.members], violation[self.members], self.success[self.members], scenarios)
 
