@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from adwa_jax.astar import SearchResult
 from adwa_jax.grid import Grid
-from adwa_jax.plan import Plan
 from adwa_jax.scenario import Scenario
 from adwa_jax.window import RobotLimits
 from scenarios.drawing import (
@@ -32,6 +32,7 @@ from scenarios.drawing import (
     new_figure,
 )
 from tuning.figures import disc_centres, draw_outline
+from tuning.planning import path_length
 from tuning.stages import Densities, Moment
 
 if TYPE_CHECKING:
@@ -71,21 +72,21 @@ def weight_figure(scenario: Scenario, found: Densities, y_down: bool = False, ax
     return figure_of(ax)
 
 
-def expansion_figure(grid: Grid, plan: Plan, name: str = "A*", y_down: bool = False,
+def expansion_figure(grid: Grid, found: SearchResult, name: str = "A*", y_down: bool = False,
                      ax: "Axes | None" = None) -> "Figure":
     """Cells coloured by the order in which the search closed them, cells it never closed white, and the grid path."""
     ax = _map_with_bar(grid, ax, y_down)
     rows, columns = int(grid.height), int(grid.width)
-    order = np.asarray(plan.search.expanded_at)[:rows, :columns]
+    order = np.asarray(found.expanded_at)[:rows, :columns]
     _draw_field(grid, np.where(order >= 0, order + 1.0, np.nan), ax, "order of expansion [1]")
-    cells = np.asarray(plan.search.path)[: int(plan.search.path_cells)]
+    cells = np.asarray(found.path)[: int(found.path_cells)]
     path = (cells[:, ::-1] + 0.5) * float(grid.resolution) + np.asarray(grid.origin)
     ax.plot(*path.T, color=BLACK, linewidth=2.0, zorder=4, label="grid path")
     if len(path):
         draw_ends(path[0], path[-1], ax)
-    free = int((~_occupied(grid)).sum())
-    expanded = f"{int(plan.search.expansions)} of {free} free cells expanded"
-    ax.set_title(f"{name}: {expanded}, path {float(plan.length):.2f} m", fontsize=FONT)
+    free, length = int((~_occupied(grid)).sum()), path_length(found) * float(grid.resolution)
+    expanded = f"{int(found.expansions)} of {free} free cells expanded"
+    ax.set_title(f"{name}: {expanded}, path {length:.2f} m", fontsize=FONT)
     legend_below(ax)
     return figure_of(ax)
 
@@ -120,8 +121,9 @@ def draw_candidates(scenario: Scenario, moment: Moment, robot: RobotLimits, ax: 
     draw_outline(discs, float(robot.radius), ax, "robot", facecolor="white", zorder=4)
     ax.plot(*np.stack([here, moment.target]).T, color=BLACK, linewidth=0.9, linestyle=":", zorder=3,
             label="to the local target")
-    ax.plot(*moment.target[:, None], marker="D", markersize=7, color=BLACK, linestyle="none", zorder=7,
-            label="local target")
+    if np.abs(moment.target - here).max() < AROUND:
+        ax.plot(*moment.target[:, None], marker="D", markersize=7, color=BLACK, linestyle="none", zorder=7,
+                label="local target")
     ax.set(xlim=here[0] + np.array([-AROUND, AROUND]))
     ax.set(ylim=here[1] + np.array([-AROUND, AROUND]) * (-1 if y_down else 1))
     for axis in (ax.xaxis, ax.yaxis):
