@@ -9,11 +9,11 @@ from rich import box
 from rich.table import Table
 
 from adwa_jax.presets import Preset, paper
-from scenarios.drawing import contact_sheet, figure_legend, new_figure
-from scenarios.suite import Suite
+from scenarios.drawing import contact_sheet
+from scenarios.suite import Suite, make_suite
 from tuning.console import progress_bar, show
 from tuning.evaluate import evaluate
-from tuning.figures import Comparison, compare_plans, drive_figure, success_figure
+from tuning.figures import Comparison, compare_drives, compare_plans, success_figure
 from tuning.intervals import mean_interval, wilson
 from tuning.replay import draw_replay, replay
 from tuning.results import Results
@@ -48,13 +48,9 @@ What differs from the paper, plainly:
 class SizeReport:
     """What was found on one map size; N maps."""
 
+    size: int  # cells a side
     maps: PlannedMaps
     results: Results
-
-    @property
-    def size(self) -> int:
-        """Cells a side."""
-        return self.maps.size
 
     @property
     def suite(self) -> Suite:
@@ -81,10 +77,11 @@ def run_demo(out: Path, count: int, seed: int, quiet: bool) -> list[SizeReport]:
 
 
 def _report(size: int, count: int, seed: int, config: Preset, quiet: bool) -> SizeReport:
-    with progress_bar(f"planning paper-{size}", quiet) as progress:
-        maps = plan_maps(size, seed, count, progress)
-    with progress_bar(f"driving {maps.suite.name}", quiet) as progress:
-        return SizeReport(maps, evaluate(maps.suite, config, progress=progress))
+    suite = make_suite(f"paper-{size}", seed, count)
+    with progress_bar(f"planning {suite.name}", quiet) as progress:
+        maps = plan_maps(suite, progress)
+    with progress_bar(f"driving {suite.name}", quiet) as progress:
+        return SizeReport(size, maps, evaluate(suite, config, progress=progress))
 
 
 def _draw(out: Path, reports: list[SizeReport], config: Preset) -> list[Path]:
@@ -111,15 +108,11 @@ def _figure3(reports: list[SizeReport]) -> "Figure":
 
 def _figure4(reports: list[SizeReport], config: Preset) -> "Figure":
     """The first scenario of each size whose goal was reached: the paper shows none that failed."""
-    figure = new_figure((4.6 * len(reports), 5.4))
-    axes = figure.subplots(1, len(reports))
-    for report, ax in zip(reports, axes, strict=True):
+    drives = {}
+    for report in reports:
         index = _first_reached(report.results)
-        driven = replay(report.suite.scenarios[index], config)
-        title = f"{report.size} x {report.size}, scenario {index}"
-        drive_figure(driven.scenario, driven.plan, driven.episode, driven.trace, title=title, ax=ax, legend=False)
-    figure_legend(figure, list(axes))
-    return figure
+        drives[f"{report.size} x {report.size}, scenario {index}"] = replay(report.suite.scenarios[index], config)
+    return compare_drives(drives)
 
 
 def _rates(reports: list[SizeReport]) -> "Figure":

@@ -8,7 +8,7 @@ import numpy as np
 from scenarios.drawing import BLACK, BLUE, FONT, ORANGE, SKY, VERMILLION, figure_legend, figure_of, new_figure
 from tuning.intervals import mean_interval
 from tuning.search_study import Tradeoff
-from tuning.table1 import PAPER_TABLE, QUANTITIES, PlannedMaps, measured
+from tuning.table1 import PAPER_TABLE, QUANTITIES, PlannedMaps, measured, verdicts
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,20 +18,23 @@ MARKS = ("o", "s", "^", "D", "v", "P")
 VERDICTS = (("improved A* better", BLUE, ""), ("equal", "#E6E6E6", "...."), ("traditional A* better", ORANGE, "////"))
 
 
-def table1_figure(reports: Sequence[PlannedMaps], axes: "Sequence[Axes] | None" = None) -> "Figure":
-    """Table 1: each quantity's mean over the maps with its 95 % interval, filled; the paper's one map, hollow."""
+def table1_figure(reports: Mapping[int, PlannedMaps], axes: "Sequence[Axes] | None" = None) -> "Figure":
+    """Table 1: each quantity's mean over the maps with its 95 % interval, filled; the paper's one map, hollow.
+
+    reports: by the side of the maps in cells.
+    """
     if axes is None:
         axes = list(new_figure((10.2, 3.7)).subplots(1, len(QUANTITIES)))
     for place, (quantity, ax) in enumerate(zip(QUANTITIES, axes, strict=True)):
         for side, (planner, marker, colour) in enumerate((("improved", "o", BLUE), ("traditional", "s", VERMILLION))):
             at = np.arange(len(reports)) + 0.18 * (side - 0.5)
-            mean, low, high = np.array([mean_interval(measured(maps)[quantity][side]) for maps in reports]).T
+            mean, low, high = np.array([mean_interval(measured(maps)[quantity][side]) for maps in reports.values()]).T
             ax.errorbar(at, mean, (mean - low, high - mean), fmt=marker, color=colour, markersize=7, capsize=3,
                         label=f"{planner} A*, mean of many maps")
-            printed = [PAPER_TABLE[maps.size][place][side] for maps in reports]
+            printed = [PAPER_TABLE[size][place][side] for size in reports]
             ax.plot(at + 0.18 * (2 * side - 1), printed, marker=marker, markersize=8, markerfacecolor="none",
                     markeredgecolor=colour, linestyle="none", label=f"{planner} A*, the paper's map")
-        sizes = [f"{maps.size} × {maps.size}\n{len(maps.improved)} maps" for maps in reports]
+        sizes = [f"{size} × {size}\n{len(maps.improved)} maps" for size, maps in reports.items()]
         ax.set_xticks(range(len(reports)), sizes)
         top = ax.get_ylim()[1]
         ax.set(xlim=(-0.6, len(reports) - 0.4), ylim=(-0.04 * top, 1.06 * top))
@@ -41,19 +44,20 @@ def table1_figure(reports: Sequence[PlannedMaps], axes: "Sequence[Axes] | None" 
     return figure_of(axes[0])
 
 
-def verdict_figure(reports: Sequence[PlannedMaps], ax: "Axes | None" = None) -> "Figure":
-    """On how many maps each planner does better, by size and quantity of Table 1. Fewer and shorter are better."""
-    rows = [(f"{quantity.partition(' [')[0]}, {maps.size} × {maps.size}", *measured(maps)[quantity])
-            for quantity in QUANTITIES for maps in reports]  # fmt: skip
+def verdict_figure(reports: Mapping[str, PlannedMaps], ax: "Axes | None" = None) -> "Figure":
+    """On how many maps each planner does better, by name and quantity of Table 1. Fewer and shorter are better."""
+    found = {name: verdicts(maps) for name, maps in reports.items()}
+    rows = {f"{quantity.partition(' [')[0]}, {name}": found[name][quantity] for quantity in QUANTITIES
+            for name in reports}  # fmt: skip
     if ax is None:
         ax = new_figure((7.6, 0.33 * len(rows) + 1.3)).subplots()
-    shares = np.array([_verdicts(improved, traditional) for _, improved, traditional in rows])
+    shares = np.array(list(rows.values()))
     left = np.zeros(len(rows))
     for (label, colour, hatch), share in zip(VERDICTS, shares.T, strict=True):
         ax.barh(np.arange(len(rows)), 100 * share, left=100 * left, height=0.7, color=colour, hatch=hatch,
                 edgecolor=BLACK, linewidth=0.6, label=label)
         left = left + share
-    ax.set_yticks(range(len(rows)), [row[0] for row in rows])
+    ax.set_yticks(range(len(rows)), list(rows))
     ax.invert_yaxis()
     ax.set(xlim=(0, 100))
     ax.set_xlabel("maps [%]", fontsize=FONT)
@@ -101,13 +105,6 @@ def draw_tradeoff(constant: Mapping[float, Tradeoff], shapes: Mapping[str, Trade
     ax.set_ylabel("path length ÷ that of ω = 1 [1]", fontsize=FONT)
     ax.tick_params(labelsize=FONT - 1)
     return ax
-
-
-def _verdicts(improved: Sequence[float], traditional: Sequence[float]) -> tuple[float, float, float]:
-    """Shares of the maps where the improved is less, equal, more."""
-    difference = np.array(improved) - np.array(traditional)
-    less, more = float(np.mean(difference < -1e-4)), float(np.mean(difference > 1e-4))
-    return less, 1.0 - less - more, more
 
 
 def _apart(line: np.ndarray) -> list[int]:

@@ -42,8 +42,8 @@ class _Tasks(NamedTuple):
     """A leading axis of searches on everything."""
 
     grid: Grid
-    start: np.ndarray  # [2] float32 (x, y) [m]
-    goal: np.ndarray  # [2] float32
+    start: jax.Array  # [2] float32 (x, y) [m]
+    goal: jax.Array  # [2] float32
 
 
 class Searches(NamedTuple):
@@ -108,8 +108,8 @@ def _stacked(scenarios: Sequence[Scenario]) -> _Tasks:
     """In one padded shape, filled up to whole calls with repetitions of the last."""
     sides = np.array([scenario.grid.occupied.shape for scenario in scenarios]).max(axis=0)
     rows, columns = (ladder_size(int(side)) for side in sides)
-    filled = [*scenarios, *scenarios[-1:] * (-len(scenarios) % AT_ONCE)]
-    tasks = [_Tasks(pad_grid(scenario.grid, rows, columns), np.asarray(scenario.start)[:2], np.asarray(scenario.goal))
+    filled = [*scenarios, *[scenarios[-1]] * (-len(scenarios) % AT_ONCE)]
+    tasks = [_Tasks(pad_grid(scenario.grid, rows, columns), scenario.start[:2], scenario.goal)
              for scenario in filled]  # fmt: skip
     return jax.tree.map(lambda *leaves: np.stack(leaves), *tasks)
 
