@@ -108,10 +108,10 @@ def draw_tradeoff(constant: Mapping[float, Tradeoff], shapes: Mapping[str, Trade
 
 
 def _apart(line: np.ndarray) -> list[int]:
-    """Indices of the points [N, 2] whose labels do not run into that of one before: the last point comes first."""
+    """Indices of the points [N, 2] whose labels do not run into that of another; the ends come first."""
     span = np.maximum(np.ptp(line, axis=0), 1e-9)
     kept: list[int] = []
-    for place in reversed(range(len(line))):
+    for place in sorted(range(len(line)), key=lambda place: place not in (0, len(line) - 1)):
         if all(np.max(np.abs(line[place] - line[other]) / span / (0.25, 0.06)) > 1.0 for other in kept):
             kept.append(place)
     return kept
