@@ -172,6 +172,7 @@ def draw_terms(moment: Moment, ax: "Axes | None" = None) -> "Axes":
         least, most = (np.array([end(values) for values in within]) for end in (np.min, np.max))
         ax.errorbar((least + most) / 2, place, xerr=(most - least) / 2, fmt="none", ecolor=BLACK, capsize=4,
                     label="all admissible candidates")
+        legend_below(ax, columns=2)
     ax.set_yticks(place, list(moment.terms))
     ax.invert_yaxis()
     ax.set_xlim(left=0)
@@ -179,7 +180,6 @@ def draw_terms(moment: Moment, ax: "Axes | None" = None) -> "Axes":
     ax.set_xlabel("weighted, normalised term [1]; their sum is the score", fontsize=FONT)
     ax.tick_params(labelsize=FONT - 1)
     ax.set_title("terms of eq. 9", fontsize=FONT)
-    legend_below(ax, columns=2)
     return ax
 
 
