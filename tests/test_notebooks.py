@@ -14,7 +14,6 @@ NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
 PICTURES = {"01_pipeline": 8, "02_astar": 8, "03_dynamic_obstacles": 5}  # at least; 1 for others
 SECONDS = 600  # a cell's, where nothing is compiled yet and the machine is busy
 
-pytestmark = pytest.mark.filterwarnings("ignore:Proactor event loop", "ignore:There is no current event loop")
 each_notebook = pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 
 
