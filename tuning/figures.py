@@ -39,6 +39,7 @@ from scenarios.drawing import (
     figure_legend,
     figure_of,
     legend_below,
+    map_size,
     mover_ways,
     new_figure,
 )
@@ -115,7 +116,8 @@ def compare_plans(comparisons: Sequence[Comparison], axes: Any = None, y_down: b
     shape = (2, len(comparisons)) if several else (1, 2)
     figure = None
     if axes is None:
-        figure = new_figure((3.6 * shape[1], 3.95 * shape[0] + 0.4))
+        height = max(map_size(comparison.grid, 3.6, 0.15)[1] for comparison in comparisons)
+        figure = new_figure((3.6 * shape[1], height * shape[0] + 0.4))
         axes = figure.subplots(*shape, squeeze=False)
     axes = np.asarray(axes).reshape(shape)
     pairs = axes.T if several else axes
@@ -166,7 +168,8 @@ def drive_figure(scenario: Scenario, plan: Plan, episode: Episode, trace: Trace,
 
 def compare_drives(drives: Mapping[str, "Replay"], y_down: bool = False) -> "Figure":
     """Fig. 4: drives side by side, each as `drive_figure` has it under its name, with one legend."""
-    figure = new_figure((4.6 * len(drives), 5.4))
+    height = max(map_size(driven.scenario.grid, 4.6, 0.6)[1] for driven in drives.values())
+    figure = new_figure((4.6 * len(drives), height))
     axes = figure.subplots(1, len(drives), squeeze=False)[0]
     for (name, driven), ax in zip(drives.items(), axes, strict=True):
         drive_figure(driven.scenario, driven.plan, driven.episode, driven.trace, title=name, ax=ax, y_down=y_down,
