@@ -1,7 +1,7 @@
 """Pictures of what happens inside the planner: density, ω, the order of expansions, one decision.
 
-Conventions: `scenarios.drawing`. Fields are light where they are small or large but never as dark as an obstacle, and
-change from light to dark in one direction, so that they can be read in grey.
+Conventions: `scenarios.drawing`. Fields go from light to dark as they grow, and never become as dark as an obstacle, so
+that they can be read in grey.
 Dimension letters: H, W map without its padding; V, N candidates; K predicted points; M movers.
 """
 
@@ -263,6 +263,7 @@ def _draw_refused(moment: Moment, ax: "Axes") -> None:
 
 def _draw_scored(moment: Moment, ax: "Axes") -> None:
     from matplotlib.collections import LineCollection
+    from matplotlib.patheffects import withStroke
 
     lines, score = np.moveaxis(moment.arcs, 0, 2)[moment.admissible], moment.score[moment.admissible]
     if len(lines):
@@ -271,7 +272,9 @@ def _draw_scored(moment: Moment, ax: "Axes") -> None:
                                zorder=5, label="admissible, by score")  # fmt: skip
         ax.add_collection(drawn, autolim=False)
     if moment.chosen:
-        ax.plot(*moment.arcs[:, *moment.chosen].T, color=VERMILLION, linewidth=2.6, zorder=6, label="chosen")
+        rim = [withStroke(linewidth=4.6, foreground="white")]  # or it would be one among many in grey
+        ax.plot(*moment.arcs[:, *moment.chosen].T, color=VERMILLION, linewidth=2.6, zorder=6, label="chosen",
+                path_effects=rim)
 
 
 def _occupied(grid: Grid) -> np.ndarray:
@@ -283,4 +286,4 @@ def _light_to_dark() -> "Colormap":
     from matplotlib import colormaps
     from matplotlib.colors import LinearSegmentedColormap
 
-    return LinearSegmentedColormap.from_list("light to dark", colormaps["viridis_r"](np.linspace(0.0, 0.65, 64)))
+    return LinearSegmentedColormap.from_list("light to dark", colormaps["viridis_r"](np.linspace(0.0, 0.55, 64)))
