@@ -92,7 +92,8 @@ def contact_sheet(suite: Suite | Sequence[Scenario], names: Sequence[str] | None
         names = suite.names if isinstance(suite, Suite) else tuple(map(str, range(len(shown))))
     columns = min(len(shown), 6 if len(shown) > 8 else 4)
     rows = ceil(len(shown) / columns)
-    figure = new_figure((1.75 * columns + 0.3, 2.05 * rows + 0.9))
+    height = max(map_size(scenario.grid, 1.75 + 0.6, 0.0)[1] - 0.5 for scenario in shown)
+    figure = new_figure((1.75 * columns + 0.3, height * rows + 0.9))
     tiles = figure.subplots(rows, columns, squeeze=False).ravel()
     for tile, scenario, name in zip(tiles, shown, names, strict=False):
         _draw_tile(scenario, name, tile, y_down)

@@ -81,17 +81,18 @@ class Row:
 
 
 def ablate(suite: Suite, rules: Sequence[str] = RULE_NAMES, driving: Callable[[Preset], Preset] = lambda config: config,
-           progress: Progress | None = None) -> Iterator[Row]:
+           progress: Progress | None = None, repeats: int = REPEATS) -> Iterator[Row]:
     """The rows of `configurations`, each as soon as it is evaluated on all scenarios of the suite.
 
     driving: puts each planner on the robot that is meant. progress: over the scenarios of all configurations. Each
-    configuration is compiled anew, which is left out of its cost.
+    configuration is compiled anew, which is left out of its cost. repeats: runs of which the cost is the least; 0: it
+    is not measured.
     """
     bases: dict[str, Results] = {}
     for place, configuration in enumerate(configurations(rules)):
         config = driving(preset(configuration.rules))
         results = evaluate(suite, config, progress=_overall(progress, place, suite, rules))
-        seconds, steps = _cost(suite, config)
+        seconds, steps = _cost(suite, config, repeats) if repeats else (0.0, 0)
         base = bases.get(configuration.base) if configuration.base else None
         if configuration.rule is None:
             bases[configuration.name] = results
@@ -115,11 +116,11 @@ def _overall(progress: Progress | None, place: int, suite: Suite, rules: Sequenc
     return lambda done, _: progress(place * count + done, len(configurations(rules)) * count)
 
 
-def _cost(suite: Suite, config: Preset) -> tuple[float, int]:
-    """Processor time [s] and control steps of the suite's first `TIMED` scenarios: the least of `REPEATS` runs."""
+def _cost(suite: Suite, config: Preset, repeats: int) -> tuple[float, int]:
+    """Processor time [s] and control steps of the suite's first `TIMED` scenarios: the least of so many runs."""
     sample = Suite(suite.name, suite.scenarios[:TIMED], suite.names[:TIMED], suite.recipe)
     times = []
-    for _ in range(REPEATS):
+    for _ in range(repeats):
         begin = time.process_time()
         results = evaluate(sample, config)
         times.append(time.process_time() - begin)

@@ -1,6 +1,6 @@
 """The paper's experiments over many maps: Table 1, Fig. 3, Fig. 4 and the success rate (§5)."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,30 +9,20 @@ from rich import box
 from rich.table import Table
 
 from adwa_jax.presets import Preset, paper
-from scenarios.drawing import contact_sheet, figure_legend, new_figure
+from scenarios.drawing import contact_sheet
 from scenarios.suite import Suite, make_suite
 from tuning.console import progress_bar, show
 from tuning.evaluate import evaluate
-from tuning.figures import Comparison, compare_plans, drive_figure, success_figure
+from tuning.figures import Comparison, compare_drives, compare_plans, success_figure
 from tuning.intervals import mean_interval, wilson
-from tuning.planning import PlannedPath, plan_paths, planner_options
 from tuning.replay import draw_replay, replay
 from tuning.results import Results
+from tuning.table1 import PAPER_TABLE, QUANTITIES, SIZES, PlannedMaps, measured, plan_maps
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-SIZES = (15, 20, 25)
 PAPER_SUCCESS = 0.956  # §3.4, "in the test scenario"
-QUANTITIES = ("path length [m]", "breaking points", "danger points")
-# Table 1, size: ((improved, traditional) of each quantity); a cell is 1 m. The paper's second row is headed
-# "15*15" again; its text speaks of 15, 20 and 25.
-PAPER_TABLE = {
-    15: ((18.8283, 18.1421), (5, 7), (0, 5)),
-    20: ((26.5173, 26.9406), (4, 11), (0, 7)),
-    25: ((35.1453, 36.7990), (8, 10), (0, 7)),
-}
-
 DIFFERENCES = """\
 What differs from the paper, plainly:
 
@@ -58,11 +48,14 @@ What differs from the paper, plainly:
 class SizeReport:
     """What was found on one map size; N maps."""
 
-    size: int
-    suite: Suite
-    improved: list[PlannedPath]  # N
-    traditional: list[PlannedPath]  # N
+    size: int  # cells a side
+    maps: PlannedMaps
     results: Results
+
+    @property
+    def suite(self) -> Suite:
+        """The maps with what is unknown of them."""
+        return self.maps.suite
 
 
 def run_claims(out: Path, count: int, seed: int, quiet: bool) -> list[SizeReport]:
@@ -85,20 +78,10 @@ def run_claims(out: Path, count: int, seed: int, quiet: bool) -> list[SizeReport
 
 def _report(size: int, count: int, seed: int, config: Preset, quiet: bool) -> SizeReport:
     suite = make_suite(f"paper-{size}", seed, count)
-    # As the text has it, "the connecting line passes through an obstacle": a line, kept a tenth of a cell clear.
-    behaviour = replace(config.constants.behaviour, clearance_margin=0.1)
-    constants = replace(config.constants, behaviour=behaviour)
-    plans: dict[str, list[PlannedPath]] = {"improved": [], "traditional": []}
     with progress_bar(f"planning {suite.name}", quiet) as progress:
-        for planner in plans:
-            options = planner_options(planner)  # pyright: ignore[reportArgumentType]
-            for done, scenario in enumerate(suite.scenarios, start=1):
-                query = np.array([[scenario.start[:2], scenario.goal]])
-                plans[planner] += plan_paths(scenario.grid, query, constants, options)
-                progress(done, count)
+        maps = plan_maps(suite, progress)
     with progress_bar(f"driving {suite.name}", quiet) as progress:
-        results = evaluate(suite, config, progress=progress)
-    return SizeReport(size, suite, plans["improved"], plans["traditional"], results)
+        return SizeReport(size, maps, evaluate(suite, config, progress=progress))
 
 
 def _draw(out: Path, reports: list[SizeReport], config: Preset) -> list[Path]:
@@ -117,23 +100,19 @@ def _draw(out: Path, reports: list[SizeReport], config: Preset) -> list[Path]:
 def _figure3(reports: list[SizeReport]) -> "Figure":
     """The first map of each size."""
     return compare_plans([
-        Comparison(f"{report.size} x {report.size}", report.suite.scenarios[0].grid, report.traditional[0],
-                   report.improved[0])
+        Comparison(f"{report.size} x {report.size}", report.suite.scenarios[0].grid, report.maps.traditional[0],
+                   report.maps.improved[0])
         for report in reports
     ])  # fmt: skip
 
 
 def _figure4(reports: list[SizeReport], config: Preset) -> "Figure":
     """The first scenario of each size whose goal was reached: the paper shows none that failed."""
-    figure = new_figure((4.6 * len(reports), 5.4))
-    axes = figure.subplots(1, len(reports))
-    for report, ax in zip(reports, axes, strict=True):
+    drives = {}
+    for report in reports:
         index = _first_reached(report.results)
-        driven = replay(report.suite.scenarios[index], config)
-        title = f"{report.size} x {report.size}, scenario {index}"
-        drive_figure(driven.scenario, driven.plan, driven.episode, driven.trace, title=title, ax=ax, legend=False)
-    figure_legend(figure, list(axes))
-    return figure
+        drives[f"{report.size} x {report.size}, scenario {index}"] = replay(report.suite.scenarios[index], config)
+    return compare_drives(drives)
 
 
 def _rates(reports: list[SizeReport]) -> "Figure":
@@ -147,23 +126,11 @@ def _first_reached(results: Results) -> int:
     return int(np.argmax(results.reached))
 
 
-def measured(report: SizeReport) -> dict[str, tuple[list[float], list[float]]]:
-    """The quantities of Table 1, (improved, traditional), one value a map."""
-    improved, traditional = report.improved, report.traditional
-    return {
-        QUANTITIES[0]: ([plan.key_point_length for plan in improved], [plan.length for plan in traditional]),
-        QUANTITIES[1]: ([plan.measures["key_point_breaking_points"] for plan in improved],
-                        [plan.measures["breaking_points"] for plan in traditional]),
-        QUANTITIES[2]: ([plan.measures["key_point_danger_points"] for plan in improved],
-                        [plan.measures["danger_points"] for plan in traditional]),
-    }  # fmt: skip
-
-
 def _rows(reports: list[SizeReport]) -> list[list[str]]:
     """Map, quantity, improved, traditional, paired difference, paper's improved, paper's traditional."""
     rows = []
     for report in reports:
-        figures = zip(measured(report).items(), PAPER_TABLE[report.size], strict=True)
+        figures = zip(measured(report.maps).items(), PAPER_TABLE[report.size], strict=True)
         for (quantity, (improved, traditional)), (paper_improved, paper_traditional) in figures:
             difference = [a - b for a, b in zip(improved, traditional, strict=True)]
             rows.append([

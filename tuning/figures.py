@@ -24,6 +24,8 @@ from scenarios.drawing import (
     BLACK,
     BLUE,
     FONT,
+    GREEN,
+    OCCUPIED,
     ORANGE,
     PURPLE,
     SKY,
@@ -37,6 +39,7 @@ from scenarios.drawing import (
     figure_legend,
     figure_of,
     legend_below,
+    map_size,
     mover_ways,
     new_figure,
 )
@@ -47,6 +50,9 @@ from tuning.planning import PlannedPath
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from tuning.replay import Replay
+    from tuning.results import Results
 
 Route = Literal["path", "key points"]
 PAPER_SUCCESS = 0.956  # §3.4
@@ -61,6 +67,15 @@ SENTENCES = {
 }
 PLANNERS = {"improved": "Improved A*", "traditional": "Traditional A*", "dijkstra": "Dijkstra"}
 _danger_steps, _danger_corners, _turning_points = map(jax.jit, (danger_steps, danger_corners, turning_points))
+OUTCOME_STYLES = {
+    Outcome.REACHED: (GREEN, ""),
+    Outcome.HIT_KNOWN: (OCCUPIED, ""),
+    Outcome.HIT_UNKNOWN: (ORANGE, "////"),
+    Outcome.HIT_MOVER: (SKY, "...."),
+    Outcome.STUCK: ("#E6E6E6", "xxxx"),
+    Outcome.TIMEOUT: ("#FFFFFF", "----"),
+    Outcome.NO_PATH: (PURPLE, "++++"),
+}
 COLLISIONS = (Outcome.HIT_KNOWN, Outcome.HIT_UNKNOWN, Outcome.HIT_MOVER)
 
 
@@ -101,7 +116,8 @@ def compare_plans(comparisons: Sequence[Comparison], axes: Any = None, y_down: b
     shape = (2, len(comparisons)) if several else (1, 2)
     figure = None
     if axes is None:
-        figure = new_figure((3.6 * shape[1], 3.95 * shape[0] + 0.4))
+        height = max(map_size(comparison.grid, 3.6, 0.15)[1] for comparison in comparisons)
+        figure = new_figure((3.6 * shape[1], height * shape[0] + 0.4))
         axes = figure.subplots(*shape, squeeze=False)
     axes = np.asarray(axes).reshape(shape)
     pairs = axes.T if several else axes
@@ -147,6 +163,38 @@ def drive_figure(scenario: Scenario, plan: Plan, episode: Episode, trace: Trace,
     ax.set_title(f"{prefixed(title)}{drive_sentence(plan, episode)}", fontsize=FONT)
     if legend:
         legend_below(ax)
+    return figure_of(ax)
+
+
+def compare_drives(drives: Mapping[str, "Replay"], y_down: bool = False) -> "Figure":
+    """Fig. 4: drives side by side, each as `drive_figure` has it under its name, with one legend."""
+    height = max(map_size(driven.scenario.grid, 4.6, 0.6)[1] for driven in drives.values())
+    figure = new_figure((4.6 * len(drives), height))
+    axes = figure.subplots(1, len(drives), squeeze=False)[0]
+    for (name, driven), ax in zip(drives.items(), axes, strict=True):
+        drive_figure(driven.scenario, driven.plan, driven.episode, driven.trace, title=name, ax=ax, y_down=y_down,
+                     legend=False)
+    figure_legend(figure, axes.tolist())
+    return figure
+
+
+def outcome_figure(results: Mapping[str, "Results"], ax: "Axes | None" = None) -> "Figure":
+    """How the scenarios ended, a bar a planner; its success with the 95 % Wilson interval stands behind its name."""
+    if ax is None:
+        ax = new_figure((8.2, 0.5 * len(results) + 1.5)).subplots()
+    left = np.zeros(len(results))
+    for outcome, (colour, hatch) in OUTCOME_STYLES.items():
+        share = np.array([100 * np.mean(found.outcome == outcome) for found in results.values()])
+        if share.any():
+            ax.barh(np.arange(len(results)), share, left=left, height=0.65, color=colour, hatch=hatch, edgecolor=BLACK,
+                    linewidth=0.6, label=SENTENCES[outcome])
+        left = left + share
+    ax.set_yticks(range(len(results)), [_rated(name, found) for name, found in results.items()])
+    ax.invert_yaxis()
+    ax.set(xlim=(0, 100))
+    ax.set_xlabel("scenarios [%]", fontsize=FONT)
+    ax.tick_params(labelsize=FONT - 1)
+    figure_legend(figure_of(ax), [ax])
     return figure_of(ax)
 
 
@@ -317,6 +365,12 @@ def draw_outline(discs: np.ndarray, radius: float, ax: "Axes", label: str = "rob
 def prefixed(title: str) -> str:
     """The title, if there is one, before what follows it."""
     return f"{title}: " if title else ""
+
+
+def _rated(name: str, results: "Results") -> str:
+    reached, count = int(results.reached.sum()), results.count
+    low, high = wilson(reached, count)
+    return f"{name}\n{100 * reached / count:.1f} % [{100 * low:.1f}, {100 * high:.1f}]"
 
 
 def _draw_panel(grid: Grid, plan: Plan | PlannedPath, route: Route, name: str, ax: "Axes", y_down: bool) -> None:

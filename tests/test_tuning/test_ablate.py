@@ -57,6 +57,12 @@ def row_of(here, base=None, rule=None, seconds=2.0, steps=1000, name="some"):
     return Row(Configuration(name, Rules(), None if base is None else "paper", rule), here, base, seconds, steps)
 
 
+def test_cost_is_not_measured_where_nobody_asks_for_it(monkeypatch):
+    monkeypatch.setattr(module, "preset", stand_in)
+    (row, _) = ablate(part_of(SUITE, [0]), (), repeats=0)
+    assert (row.results.count, row.microseconds_a_step()) == (1, None)
+
+
 def test_each_rule_is_taken_from_the_extended_planner_and_added_to_the_papers():
     both = configurations(RULES)
     assert [(each.name, each.base) for each in both] == [

@@ -23,9 +23,20 @@ from scenarios.generators import toy
 from scenarios.generators.assembly import grid_of
 from tuning import animation
 from tuning.animation import animate_drive
-from tuning.figures import Comparison, compare_plans, danger_points, drive_figure, plan_figure, success_figure
+from tuning.figures import (
+    Comparison,
+    compare_drives,
+    compare_plans,
+    danger_points,
+    drive_figure,
+    outcome_figure,
+    plan_figure,
+    success_figure,
+)
 from tuning.intervals import wilson
 from tuning.planning import PlannedPath, plan_paths, planner_constants, planner_options
+from tuning.replay import Replay
+from tuning.results import Results
 
 # Two cells touch at the corner (2, 2), a third lies beside the last diagonal step, which ends at (4, 4).
 GRID = grid_of(np.array([[cell == "#" for cell in row] for row in ("....", "..#.", ".#..", "..#.")]), 1.0)
@@ -274,6 +285,31 @@ def test_bars_carry_wilson_intervals_beside_the_papers_rate():
     assert segments[0][:, 1] == pytest.approx([100 * low, 100 * high])
     assert the(ax, "paper: 95.6 % in “the test scenario”").get_ydata() == pytest.approx([95.6, 95.6])
     assert ax.get_xticklabels()[0].get_text() == "15\n85.5 %\n171 of 200"
+
+
+def test_drives_stand_side_by_side_under_their_names_with_one_legend():
+    driven = Replay(SCENARIO, PLAN, episode_of(Outcome.REACHED), trace_of(), jackal())
+    figure = compare_drives({"one": driven, "other": driven})
+    assert [ax.get_title().split(":")[0] for ax in figure.axes] == ["one", "other"]
+    assert all(ax.get_legend() is None for ax in figure.axes)
+    texts = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert texts.count("driven path") == 1
+
+
+def results_of(*outcomes):
+    return Results("drawn", tuple(map(str, range(len(outcomes)))), np.array(outcomes, np.int32), {})
+
+
+def test_outcomes_are_stacked_to_100_percent_beside_the_rate_of_success():
+    results = {"a": results_of(Outcome.REACHED, Outcome.REACHED, Outcome.STUCK, Outcome.HIT_MOVER),
+               "b": results_of(Outcome.REACHED)}  # fmt: skip
+    ax = outcome_figure(results).axes[0]
+    widths = {bars.get_label(): [bar.get_width() for bar in bars] for bars in ax.containers}
+    assert widths == {"reached the goal": [50.0, 100.0], "hit a mover": [25.0, 0.0], "got stuck": [25.0, 0.0]}
+    low, high = wilson(2, 4)
+    assert ax.get_yticklabels()[0].get_text() == f"a\n50.0 % [{100 * low:.1f}, {100 * high:.1f}]"
+    looks = {(to_hex(bars[0].get_facecolor()), bars[0].get_hatch()) for bars in ax.containers}
+    assert len(looks) == 3
 
 
 def test_a_film_shows_the_drive_and_holds_its_end(tmp_path):
