@@ -12,7 +12,6 @@ from jax import lax
 from adwa_jax.admissible import halts_clear, is_admissible, room_to_stop
 from adwa_jax.constants import Constants, Options
 from adwa_jax.grid import DistanceField, Scalar
-from adwa_jax.native import folded
 from adwa_jax.obstacles import Sensed
 from adwa_jax.prediction import Prediction, candidate_clearance, clearance_now, predict
 from adwa_jax.profiles import (
@@ -133,17 +132,10 @@ def chosen(state: RobotState, judged: Judged, guidance: Guidance, constants: Con
 def _first_largest(values: jax.Array) -> jax.Array:
     """[] int32: the lowest index (v-major) of the largest value. values: [V, N].
 
-    Index and value go together through the comparisons. To look for what equals the largest value would take a compiler
+    Index and value go together through the comparisons: to look for what equals the largest value would take a compiler
     that works out no value twice, with other last bits.
     """
-    index = jnp.arange(values.size, dtype=jnp.int32).reshape(values.shape)
-
-    def better(best: tuple, other: tuple) -> tuple:
-        first = (best[0] > other[0]) | ((best[0] == other[0]) & (best[1] < other[1]))
-        return jnp.where(first, best[0], other[0]), jnp.where(first, best[1], other[1])
-
-    columns = folded(better, list(zip(values, index, strict=True)))
-    return folded(better, list(zip(*columns, strict=True)))[1]
+    return jnp.argmax(values.reshape(-1)).astype(jnp.int32)
 
 
 def _judged_as_printed(state: RobotState, field: DistanceField, sensed: Sensed, constants: Constants,

@@ -31,7 +31,7 @@ from tuning.plans_ahead import Pair, Planner, planned_by
 FINEST_SPACING = 0.1  # [m]; the distance field is no finer, however many lattice steps a cell the options ask for
 # Side of the map [cells] up to which a worker has so many lanes: enough for whole vectors, few because what they hold
 # should stay in the cache, and because lanes without work, as there are at the end, cost as much as those with it.
-LANES = ((256, 16), (512, 8))
+LANES = ((128, 32), (256, 16), (512, 8))
 FEWEST_LANES = 4
 FILLED_AT_ONCE = 4  # lanes that one call fills
 LOOK = 0.2  # [s] between two looks at how far the work is
