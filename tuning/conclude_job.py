@@ -46,9 +46,10 @@ def drive_held_out(folder: Path, setup: Setup, log: Log, quiet: bool) -> None:
     """Judge the default, the front and every choice on the held-out scenarios, as far as the store lacks it."""
     training = as_evaluations(folder / TRAINING)
     rows, scenarios = held_out_rows(training, setup), len(setup.held_out.scenarios)
-    store = Store(folder / HELD_OUT, setup.space.names, setup.held_out.names)
+    store = Store(folder / HELD_OUT, setup.space.names, setup.held_out.names, setup.figures)
     with progress_bar(f"held out, {setup.held_out.name}", quiet) as progress:
-        judge = TiledJudge(store, setup.held_out, setup.space, log, len(rows) * scenarios, progress)
+        judge = TiledJudge(store, setup.held_out, setup.space, log, len(rows) * scenarios, progress,
+                           setup.plans_only)
         began = time.perf_counter()
         judge.admitted(0, training.values[rows], training.generation[rows])(np.arange(len(rows)), 0, scenarios)
     log.write("held out", candidates=len(rows), driven=judge.driven, seconds=round(time.perf_counter() - began, 3))
@@ -85,7 +86,7 @@ def _gallery(folder: Path, setup: Setup, preset: Preset, held_out: Evaluations |
     """Pictures of the recommended constants' worst held-out scenarios."""
     from tuning.failures import failure_pictures, results_of
 
-    if held_out is None:
+    if held_out is None or setup.plans_only:
         return ()
     row = int(np.flatnonzero(rows == _recommended(findings).row)[0])
     results = results_of(held_out, row, setup.held_out)

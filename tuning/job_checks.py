@@ -18,6 +18,7 @@ from tuning.choice import mistakes as choice_mistakes
 from tuning.job_file import ConstraintTable, Job, ObjectiveTable, SuiteTable, refused
 from tuning.objectives import DEFAULT_OBJECTIVES, Constraint, Goals, Statistic, measures_of
 from tuning.options import Vehicle, configured, reach_of
+from tuning.plans_only import PLANNED
 from tuning.sources import read_suite
 from tuning.space import Parameter, Space, tunable
 from tuning.store import FIGURES, TILE_WIDTH
@@ -39,6 +40,17 @@ class Setup:
     held_out: Suite
     y_down: bool  # whether all maps have their y axis downwards in pictures
     inputs: dict[str, str]  # place in the file -> checksum of what was read there
+
+    @property
+    def plans_only(self) -> bool:
+        """Whether all that matters is known of a plan: then nothing is driven."""
+        statistics = [*self.goals.objectives, *(constraint.statistic for constraint in self.goals.constraints)]
+        return all(statistic.measure in PLANNED for statistic in statistics)
+
+    @property
+    def figures(self) -> tuple[str, ...]:
+        """What is kept of every candidate on every scenario."""
+        return (*PLANNED, "outcome") if self.plans_only else tuple(FIGURES)
 
 
 def mistakes_of(job: Job, folder: Path) -> list[str]:

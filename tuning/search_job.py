@@ -32,9 +32,9 @@ def search(folder: Path, setup: Setup, log: Log, quiet: bool) -> None:
     scenarios, budget = len(setup.training.scenarios), setup.job.method.episodes
     method = _begun(folder, setup)
     points = _first(method, setup, folder)
-    store = Store(folder / TRAINING, setup.space.names, setup.training.names)
+    store = Store(folder / TRAINING, setup.space.names, setup.training.names, setup.figures)
     with progress_bar(f"tuning on {setup.training.name}", quiet) as progress:
-        judge = TiledJudge(store, setup.training, setup.space, log, budget, progress)
+        judge = TiledJudge(store, setup.training, setup.space, log, budget, progress, setup.plans_only)
         past = _Past(setup, judge, log)
         past.generation(setup.space.default[None], racing=False)
         while points is not None and past.spent + len(points) * scenarios <= budget:

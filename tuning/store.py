@@ -30,9 +30,9 @@ WHOLE = ("outcome", "brakings", "replans", "key_point_count", "expansions", "bre
 # Of the engine's columns, in its order.
 FIGURES: dict[str, type] = {
     name: np.bool_ if name == "hit_while_stopped" else np.int32 if name in WHOLE else np.float32
-    for name in ("optimal_length", "planned_length", "key_point_length", "key_point_count", "expansions",
-                 *(f"planned_{name}" for name in PlannedMeasures._fields), "outcome", "hit_while_stopped", "brakings",
-                 "replans", *Measures._fields)
+    for name in ("optimal_length", "planned_length", "planned_length_ratio", "key_point_length", "key_point_count",
+                 "expansions", *(f"planned_{name}" for name in PlannedMeasures._fields), "outcome",
+                 "hit_while_stopped", "brakings", "replans", *Measures._fields)
 }  # fmt: skip
 TILE_WIDTH = 64  # scenarios of a tile: seconds of work, and a file of a few kilobytes
 MARK = 1 << 32  # beside the checksum, so that a mark is never 0
@@ -41,13 +41,14 @@ MARK = 1 << 32  # beside the checksum, so that a mark is never 0
 class Store:
     """The evaluations of one suite. Figures are kept as float32, in which whole ones below 2²⁴ are exact."""
 
-    def __init__(self, path: Path, parameters: Sequence[str], names: Sequence[str]):
+    def __init__(self, path: Path, parameters: Sequence[str], names: Sequence[str],
+                 figures: Sequence[str] = tuple(FIGURES)):
         """Open the group, or make it. InputError if it is another job's, or its description is damaged."""
-        self.path = path
+        self.path, self._figures = path, tuple(figures)
         self.width = min(TILE_WIDTH, len(names))
         self.tiles = [slice(start, min(start + self.width, len(names))) for start in range(0, len(names), self.width)]
-        self._attributes = {"parameters": list(parameters), "scenarios": list(names), "figures": list(FIGURES),
-                            "units": {name: UNITS.get(name, "") for name in FIGURES}}  # fmt: skip
+        self._attributes = {"parameters": list(parameters), "scenarios": list(names), "figures": list(figures),
+                            "units": {name: UNITS.get(name, "") for name in figures}}  # fmt: skip
         for unfinished in path.rglob("*.partial"):  # of a process that was killed
             unfinished.unlink()
         self._arrays = self._opened()
@@ -69,7 +70,7 @@ class Store:
 
     def write(self, rows: np.ndarray, tiles: slice, values: np.ndarray, columns: Mapping[str, np.ndarray]) -> None:
         """Keep whole tiles of candidates, rows: [C] ascending. values: [C, D]; columns: name -> [C, of the tiles]."""
-        block = np.stack([columns[name].astype(np.float32) for name in FIGURES], axis=-1)
+        block = np.stack([columns[name].astype(np.float32) for name in self._figures], axis=-1)
         start, stop = self.tiles[tiles.start].start, self.tiles[tiles.stop - 1].stop
         for places in _runs(rows):
             within = slice(int(rows[places.start]), int(rows[places.stop - 1]) + 1)
@@ -89,7 +90,7 @@ class Store:
         figures = self._arrays["figures"]
         block = np.concatenate([np.asarray(figures[int(rows[part.start]) : int(rows[part.stop - 1]) + 1, start:stop])
                                 for part in _runs(rows)])  # fmt: skip
-        return _columns(block)
+        return _columns(block, self._figures)
 
     def _opened(self) -> dict[str, Any]:
         try:
@@ -148,7 +149,8 @@ def read_store(path: Path) -> tuple[Evaluations, tuple[str, ...]]:
     try:
         group = zarr.open_group(path, mode="r")
         arrays: dict[str, Any] = {name: group[name] for name in ("figures", "done", "values", "generation")}
-        parameters, names = tuple(group.attrs["parameters"]), tuple(group.attrs["scenarios"])  # pyright: ignore
+        parameters, names, figures = (tuple(group.attrs[key])  # pyright: ignore
+                                      for key in ("parameters", "scenarios", "figures"))  # fmt: skip
         values, generation = np.asarray(arrays["values"][:]), np.asarray(arrays["generation"][:])
     except (KeyError, ValueError, TypeError, FileNotFoundError, RuntimeError) as error:
         raise InputError(f"{path}: cannot be read ({' '.join(str(error).split())}); must be a store of a job's "
@@ -159,21 +161,20 @@ def read_store(path: Path) -> tuple[Evaluations, tuple[str, ...]]:
     marks, block = _holding(arrays, slice(0, count), values, tiles)
     done = np.repeat(marks > 0, [part.stop - part.start for part in tiles], axis=1)
     block[~done] = 0.0
-    return Evaluations(parameters, values[:count], generation[:count], _columns(block), done), names
+    return Evaluations(parameters, values[:count], generation[:count], _columns(block, figures), done), names
 
 
 def _made(path: Path, attributes: Mapping[str, Any], tiles: int, width: int) -> dict[str, Any]:
     """An empty store; its description is written last."""
     group = zarr.create_group(path, attributes=dict(attributes), overwrite=True)
-    scenarios, parameters = len(attributes["scenarios"]), len(attributes["parameters"])
+    scenarios, parameters, figures = (len(attributes[key]) for key in ("scenarios", "parameters", "figures"))
 
     def array(name: str, kind: str, fill: Any, shape: tuple[int, ...], chunks: tuple[int, ...], *names: str) -> Any:
         return group.create_array(name, shape=(0, *shape), chunks=(1, *chunks), dtype=kind, fill_value=fill,
                                   dimension_names=("candidate", *names))  # fmt: skip
 
     return {
-        "figures": array("figures", "float32", np.nan, (scenarios, len(FIGURES)), (width, len(FIGURES)), "scenario",
-                         "figure"),
+        "figures": array("figures", "float32", np.nan, (scenarios, figures), (width, figures), "scenario", "figure"),
         "done": array("done", "uint64", 0, (tiles,), (tiles,), "tile"),
         "values": array("values", "float64", np.nan, (parameters,), (parameters,), "parameter"),
         "generation": array("generation", "int32", -1, (), ()),
@@ -217,9 +218,9 @@ def _mark(values: np.ndarray, figures: np.ndarray) -> int:
     return MARK | zlib.crc32(content)
 
 
-def _columns(block: np.ndarray) -> dict[str, np.ndarray]:
+def _columns(block: np.ndarray, figures: Sequence[str]) -> dict[str, np.ndarray]:
     """Figures [W, S, M] by name, in the engine's types."""
-    return {name: block[..., index].astype(kind) for index, (name, kind) in enumerate(FIGURES.items())}
+    return {name: block[..., index].astype(FIGURES[name]) for index, name in enumerate(figures)}
 
 
 def _masked(values: np.ndarray, done: np.ndarray) -> np.ndarray:

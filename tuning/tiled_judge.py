@@ -12,6 +12,7 @@ from adwa_jax.presets import Preset
 from scenarios.suite import Suite
 from tuning.engine import Judged, Progress, judge_pairs
 from tuning.job_folder import Log
+from tuning.plans_only import judge_plans
 from tuning.racing import Judge
 from tuning.space import Space
 from tuning.store import Store
@@ -30,8 +31,10 @@ class Block(NamedTuple):
 class TiledJudge:
     """Judges the generations of a job on one suite."""
 
-    def __init__(self, store: Store, suite: Suite, space: Space, log: Log, total: int, progress: Progress):
-        """total: episodes there may be in all, for the progress."""
+    def __init__(self, store: Store, suite: Suite, space: Space, log: Log, total: int, progress: Progress,
+                 plans_only: bool = False):
+        """total: episodes there may be in all, for the progress; plans_only: nothing is driven."""
+        self._judge_pairs = judge_plans if plans_only else judge_pairs
         self.driven, self.read, self.engine_seconds = 0, 0, 0.0  # episodes; by this process, and found done
         self._total = total
         self._store, self._suite, self._space, self._log = store, suite, space, log
@@ -73,7 +76,7 @@ class TiledJudge:
         start, stop = self._store.tiles[block.tiles.start].start, self._store.tiles[block.tiles.stop - 1].stop
         candidates = [presets[place].constants for place in block.places]
         began = time.perf_counter()
-        judged = judge_pairs(self._suite.scenarios[start:stop], candidates, presets[block.places[0]].options,
+        judged = self._judge_pairs(self._suite.scenarios[start:stop], candidates, presets[block.places[0]].options,
                              progress=lambda done, _: self._progress(self.read + self.driven + done, self._total))
         seconds = time.perf_counter() - began
         self._keep(judged, block, first, values)

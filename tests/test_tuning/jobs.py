@@ -47,7 +47,8 @@ def written(folder: Path, text: str = JOB) -> Path:
 
 def short_report(folder, job, findings, training, held_out, held_out_rows, remembered, environment, gallery):
     """Depends on all that a report is made of."""
-    totals = [float(np.sum(found.columns["length"], dtype=np.float64)) for found in (training, held_out) if found]
+    totals = [{name: float(np.sum(column, dtype=np.float64)) for name, column in found.columns.items()}
+              for found in (training, held_out) if found]  # fmt: skip
     facts = job.name, len(findings.front), held_out_rows.tolist(), totals, sorted(remembered), environment["inputs"]
     write_whole(folder / "report.html", f"{facts}\n")
     return folder / "report.html"

@@ -15,6 +15,7 @@ from scenarios.errors import InputError
 from tests.test_tuning.jobs import CANDIDATES, JOB, SCENARIOS, in_small_pieces, pairs_driven, results_of, written
 from tuning import racing, tiled_judge
 from tuning.job_folder import events_of, locked
+from tuning.plans_only import PLANNED
 from tuning.run_job import report_job, resume_job, run_job
 from tuning.store import as_evaluations, open_evaluations
 from tuning.weights_file import load_weights
@@ -63,6 +64,20 @@ def test_all_that_the_budget_pays_for_is_judged(whole):
     driven = pairs_driven(events_of(whole))
     assert len(driven) == len(set(driven))
     assert sum(suite == "training" for suite, _, _ in driven) == CANDIDATES * SCENARIOS
+
+
+def test_where_plans_are_all_that_matters_nothing_is_driven(tmp_path):
+    other = "[parameters.sparse_base]\nlow = 1.0\nhigh = 3.0"
+    text = JOB.replace("[parameters.clearance]\nlow = 0.02\nhigh = 0.5", other)
+    goals = '[[objectives]]\nmeasure = "expansions"\ndirection = "min"\n'
+    file = written(tmp_path, text.replace("[parameters.velocity]", f"{goals}[parameters.velocity]"))
+    findings = run_job(file, tmp_path / "out", quiet=True)
+    training = as_evaluations(tmp_path / "out" / "training.zarr")
+    assert training.done.all()
+    assert set(training.columns) == {*PLANNED, "outcome"}
+    best = findings.front[0].training.objectives[0].value
+    assert best == training.columns["expansions"].mean(axis=1).min() < findings.default.training.objectives[0].value
+    assert "length" not in open_evaluations(tmp_path / "out")
 
 
 def test_the_recommended_constants_are_a_file_of_weights(whole):
