@@ -102,6 +102,7 @@ def set_up(job: Job, path: Path, folder: Path, quiet: bool, progress: Progress |
     if mistakes:
         raise refused(path, mistakes)
     inputs = {part.place: _checksum(part.suite) for part in parts}
+    inputs["job"] = hashlib.sha256(job.model_dump_json().encode()).hexdigest()
     inputs["planner"] = hashlib.sha256(repr(config).encode()).hexdigest()
     y_down = all(part.y_down for part in parts)
     return Setup(job, space_of(job, config), goals_of(job), training, held_out, y_down, inputs)

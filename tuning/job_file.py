@@ -23,6 +23,7 @@ from tuning.suite_files import LARGEST_SEED
 MOST_EPISODES = 10**9
 Share = Annotated[float, Field(gt=0.0, le=1.0)]
 Seed = Annotated[int, Field(ge=0, le=LARGEST_SEED)]
+Name = Annotated[str, Field(min_length=1, max_length=1024, pattern=r"^[^\x00]*$")]  # of a suite or a file
 
 
 class Table(BaseModel):
@@ -38,15 +39,15 @@ class PlannerTable(Table):
     robot: str | None = None
     v_max: float | None = Field(default=None, gt=0.0, le=FASTEST)  # [m/s]
     sensor_range: float | None = Field(default=None, gt=0.0, le=FARTHEST)  # [m]
-    weights: str | None = None  # a file of constants to start from
+    weights: Name | None = None  # a file of constants to start from
 
 
 class SuiteTable(Table):
     """Some scenarios, as by the options of `adwa evaluate`."""
 
-    suite: str | None = None
-    suite_file: str | None = None
-    map: str | None = None
+    suite: Name | None = None
+    suite_file: Name | None = None
+    map: Name | None = None
     count: int | None = Field(None, ge=1, le=10**6)
     seed: Seed = 0
     sensed_only: bool = False

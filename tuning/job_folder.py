@@ -88,7 +88,10 @@ def environment_of(folder: Path) -> dict[str, Any]:
     try:
         if not (folder / JOB).exists():
             raise FileNotFoundError(JOB)
-        return json.loads((folder / ENVIRONMENT).read_text(encoding="utf-8"))
+        environment = json.loads((folder / ENVIRONMENT).read_text(encoding="utf-8"))
+        if not isinstance(environment, dict) or not {"versions", "job_file", "inputs"} <= set(environment):
+            raise ValueError(f"{ENVIRONMENT} is damaged")
+        return environment
     except (OSError, ValueError) as error:
         raise InputError(f"{folder}: no job ({' '.join(str(error).split())}); must be the folder of a job that has "
                          "begun; name one, or begin: adwa tune run JOB --out DIR") from None  # fmt: skip
@@ -139,7 +142,7 @@ def events_of(folder: Path) -> list[dict[str, Any]]:
         for line in (folder / LOG).read_text(encoding="utf-8", errors="replace").splitlines():
             with suppress(ValueError):
                 events.append(json.loads(line))
-    return events
+    return [event for event in events if isinstance(event, dict) and "event" in event]
 
 
 def remember(folder: Path, key: str, compute: Callable[[], dict[str, np.ndarray]]) -> dict[str, np.ndarray]:

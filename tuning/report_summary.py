@@ -94,7 +94,8 @@ def success_table(findings: Findings) -> str:
     rows = [("training", str(default.training.scenarios), shown(SUCCESS, default.training.success),
              shown(SUCCESS, best.training.success), NONE)]  # fmt: skip
     if best.held_out is not None and default.held_out is not None:
-        change = shown_difference(SUCCESS, compared.success) if compared is not None else NONE
+        told = compared if best.row != default.row else None
+        change = NONE if told is None else shown_difference(SUCCESS, told.success)
         rows.append(("held out", str(best.held_out.scenarios), shown(SUCCESS, default.held_out.success),
                      shown(SUCCESS, best.held_out.success), change))  # fmt: skip
     return table("Success, with 95 % Wilson intervals; the change is paired, in percentage points",
@@ -116,7 +117,7 @@ def objectives_table(findings: Findings) -> str:
     for index, statistic in enumerate(findings.goals.objectives):
         judgements = (default.training, best.training, default.held_out, best.held_out)
         cells = [NONE if judged is None else shown(statistic, judged.objectives[index]) for judged in judgements]
-        if compared is None:
+        if compared is None or best.row == default.row:
             cells += [NONE, NONE]
         else:
             difference = compared.objectives[index]

@@ -58,7 +58,7 @@ def resume_job(folder: Path, quiet: bool = False) -> Findings:
 def report_job(folder: Path, quiet: bool = False) -> Findings:
     """Analyse and report anew what is done."""
     setup = _reread(folder, quiet)
-    with storing(folder):
+    with storing(folder), locked(folder):
         return conclude(folder, setup, environment_of(folder))
 
 

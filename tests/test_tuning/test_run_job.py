@@ -226,3 +226,22 @@ def test_killed_and_told_to_stop_it_goes_on_to_the_same_bytes_and_does_nothing_t
     assert results_of(folder) == results_of(whole)
     driven = pairs_driven(events_of(folder))
     assert len(driven) == len(set(driven))
+
+
+def test_a_job_file_that_was_edited_since_is_not_gone_on_with(whole, tmp_path):
+    folder = tmp_path / "copy"
+    shutil.copytree(whole, folder)
+    text = (folder / "job.toml").read_text()
+    (folder / "job.toml").write_text(text.replace("high = 1.5", "high = 1.4"))
+    for again in (resume_job, report_job):
+        with pytest.raises(InputError, match="job; not what the job began with"):
+            again(folder, quiet=True)
+
+
+@pytest.mark.parametrize("content", ["{}", "[]", "not JSON"])
+def test_a_damaged_environment_is_one_line(whole, tmp_path, content):
+    folder = tmp_path / "copy"
+    shutil.copytree(whole, folder)
+    (folder / "environment.json").write_text(content)
+    with pytest.raises(InputError, match="no job"):
+        resume_job(folder, quiet=True)

@@ -22,7 +22,7 @@ INSIDE = 0.02  # start points are so far from the cube's faces
 class Settings(BaseModel):
     """Of this method."""
 
-    model_config = ConfigDict(extra="forbid")
+    model_config = ConfigDict(extra="forbid", strict=True)
 
     scalarisations: int = Field(4, ge=1, le=64)
     """Searches side by side, their weights spread over the objectives; one suffices for a single objective."""

@@ -52,22 +52,22 @@ LENGTHS = (0.5, 1.0, 2.0)  # points along a hard gradient, in units of the start
 class Settings(BaseModel):
     """What the job file may say."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
     starts: int = Field(8, ge=1, le=256)
     steps: int = Field(3, ge=1, le=100)  # J, on the relaxed loss in a round
     learning_rate: float = Field(0.05, gt=0.0, le=1.0)  # Adam's, in the unit cube
     temperature: float = Field(0.03, gt=0.0, le=10.0)
     variant: Variant = "straight_through"
-    scenarios: int = Field(8, ge=1)  # of the training suite, drawn anew for each round's surrogate
+    scenarios: int = Field(8, ge=1, le=1024)  # of the training suite, drawn anew for each round's surrogate
     stretch: int = Field(30, ge=1, le=1000)  # control steps
-    truncate: int = Field(10, ge=1)  # control steps that gradients reach back
-    stretches: int = Field(3, ge=1)  # of each episode
-    every: int = Field(50, ge=1)  # control steps between their beginnings
-    es_pairs: int = Field(4, ge=1)  # P
+    truncate: int = Field(10, ge=1, le=1000)  # control steps that gradients reach back
+    stretches: int = Field(3, ge=1, le=100)  # of each episode
+    every: int = Field(50, ge=1, le=10_000)  # control steps between their beginnings
+    es_pairs: int = Field(4, ge=1, le=1024)  # P
     es_scale: float = Field(0.1, gt=0.0, le=0.25)  # of the probes, in the unit cube
     reach: float = Field(0.15, gt=0.0, le=1.0)  # of a first step along a hard gradient, times √D
     trust: Literal["surrogate", "hard", "blend"] = "blend"  # whose points are judged; blend: both
-    resamples: int = Field(200, ge=2)  # for the intervals of the agreement
+    resamples: int = Field(200, ge=2, le=10_000)  # for the intervals of the agreement
 
 
 def gradient(problem: Problem) -> Search:

@@ -24,7 +24,7 @@ from tuning.objectives import Scores
 class Settings(BaseModel):
     """Of this method."""
 
-    model_config = ConfigDict(extra="forbid")
+    model_config = ConfigDict(extra="forbid", strict=True)
 
     population: int | None = Field(None, ge=4, le=1024)
     """Candidates a generation, no fewer than objectives; by default a 64th of the budget, from 16 to 128."""

@@ -10,7 +10,7 @@ from tuning.methods.method import Problem, Search
 class Settings(BaseModel):
     """Of this method."""
 
-    model_config = ConfigDict(extra="forbid")
+    model_config = ConfigDict(extra="forbid", strict=True)
 
     generation: int = Field(64, ge=1, le=4096)
     """Candidates that are judged together; a power of two, over which the points balance."""

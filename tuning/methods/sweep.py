@@ -17,9 +17,9 @@ SAME = 1e-9  # relative; by which one constant may come out differently by round
 class Settings(BaseModel):
     """Of this method."""
 
-    model_config = ConfigDict(extra="forbid")
+    model_config = ConfigDict(extra="forbid", strict=True)
 
-    step: float = Field(0.1, gt=0.0, le=1e6)
+    step: float = Field(0.1, ge=1e-3, le=1e6)
     """Between neighbours: in the parameter's own units where linear, in decades where log; counts take every value."""
 
 
