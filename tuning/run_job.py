@@ -14,7 +14,9 @@ from tuning.findings import Findings
 from tuning.job_checks import Setup, set_up
 from tuning.job_file import load_job
 from tuning.job_folder import (
+    HELD_OUT,
     JOB,
+    TRAINING,
     Log,
     begin,
     differing_versions,
@@ -26,6 +28,7 @@ from tuning.job_folder import (
     storing,
 )
 from tuning.search_job import search
+from tuning.store import damaged_tiles
 
 
 def run_job(file: Path, folder: Path, quiet: bool = False) -> Findings:
@@ -59,7 +62,11 @@ def report_job(folder: Path, quiet: bool = False) -> Findings:
     """Analyse and report anew what is done."""
     setup = _reread(folder, quiet)
     with storing(folder), locked(folder):
-        return conclude(folder, setup, environment_of(folder))
+        findings = conclude(folder, setup, environment_of(folder))
+        damaged = sum(damaged_tiles(folder / name) for name in (TRAINING, HELD_OUT) if (folder / name).exists())
+        if damaged:
+            note(f"adwa: {damaged} damaged tiles are left out; to drive them anew: adwa tune resume {folder}")
+        return findings
 
 
 def read_setup(file: Path, home: Path, quiet: bool = False) -> Setup:

@@ -144,6 +144,17 @@ def as_evaluations(path: Path) -> Evaluations:
     return found.rows(np.arange(some[-1] + 1 if some.size else 0))
 
 
+def damaged_tiles(path: Path) -> int:
+    """How many tiles of the store at a path were written and are no longer as they were."""
+    group = zarr.open_group(path, mode="r")
+    arrays: dict[str, Any] = {name: group[name] for name in ("figures", "done", "values")}
+    count = min(array.shape[0] for array in arrays.values())
+    scenarios, width = arrays["figures"].shape[1], arrays["figures"].chunks[1]
+    tiles = [slice(start, min(start + width, scenarios)) for start in range(0, scenarios, width)]
+    kept, _ = _holding(arrays, slice(0, count), np.asarray(arrays["values"][:]), tiles)
+    return int((_decoded(arrays["done"], slice(0, count), [slice(None)], 0) > 0).sum() - (kept > 0).sum())
+
+
 def read_store(path: Path) -> tuple[Evaluations, tuple[str, ...]]:
     """What the store at a path holds, and the scenarios' names. InputError where there is none."""
     try:

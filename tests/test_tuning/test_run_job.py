@@ -245,3 +245,17 @@ def test_a_damaged_environment_is_one_line(whole, tmp_path, content):
     (folder / "environment.json").write_text(content)
     with pytest.raises(InputError, match="no job"):
         resume_job(folder, quiet=True)
+
+
+def test_a_report_says_what_is_damaged(whole, tmp_path, capsys):
+    folder = tmp_path / "copy"
+    shutil.copytree(whole, folder)
+    report_job(folder, quiet=True)
+    assert "damaged" not in capsys.readouterr().err
+    chunk = next(path for path in sorted((folder / "training.zarr" / "figures").rglob("*"))
+                 if path.is_file() and path.name != "zarr.json" and "/c/3/" in str(path))  # fmt: skip
+    content = bytearray(chunk.read_bytes())
+    content[-1] ^= 1
+    chunk.write_bytes(content)
+    report_job(folder, quiet=True)
+    assert "1 damaged tiles are left out" in capsys.readouterr().err
