@@ -71,6 +71,10 @@ class _Collected:
             if self._progress and pair.candidate == 0:
                 self._progress(int(self.done.sum()), self.done.size)
 
+    def count(self, plans: int) -> None:
+        with self._lock:
+            self.plans += plans
+
 
 def _plan(scenarios: Sequence[Scenario], candidates: Sequence[Constants], program: Program, pairs: Sequence[Pair],
           collected: _Collected) -> None:
@@ -81,4 +85,4 @@ def _plan(scenarios: Sequence[Scenario], candidates: Sequence[Constants], progra
         found = planned.plan.search.status == Status.FOUND
         outcome = np.int32(Outcome.REACHED if found else Outcome.NO_PATH)
         collected.write(pair, planned.figures | {"outcome": outcome})
-    collected.plans += planner.plans_made
+    collected.count(planner.plans_made)
