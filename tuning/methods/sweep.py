@@ -1,7 +1,6 @@
 """The paper's sweep (§3.4): each parameter in turn over its range, the others fixed at their defaults."""
 
 from math import floor, log10
-from typing import NamedTuple
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
@@ -23,13 +22,6 @@ class Settings(BaseModel):
     """Between neighbours: in the parameter's own units where linear, in decades where log; counts take every value."""
 
 
-class Curve(NamedTuple):
-    """The candidates in which one parameter varies and no other."""
-
-    parameter: int  # index into the space's
-    rows: np.ndarray  # [N] int64, lowest value first; the default is among them
-
-
 def sweep(problem: Problem) -> Search:
     """One generation a parameter. Where the budget pays for fewer points, those of every parameter are thinned evenly.
 
@@ -48,19 +40,6 @@ def sweep(problem: Problem) -> Search:
 def needed(space: Space, settings: Settings) -> int:
     """Candidates of the whole sweep."""
     return sum(len(points) for points in _lines(space, settings.step))
-
-
-def sweep_rows(space: Space, values: np.ndarray) -> list[Curve]:
-    """One curve a parameter, found among the constants [W, D] of candidates, whichever method asked for them.
-
-    Those are on a curve that differ from the swept point, the default brought into its range, in that parameter alone.
-    """
-    differs = ~np.isclose(values, _swept_point(space)[1], rtol=SAME, atol=0.0)
-    curves = []
-    for index in range(values.shape[1]):
-        rows = np.flatnonzero(~np.delete(differs, index, axis=1).any(axis=1))
-        curves.append(Curve(index, rows[np.argsort(values[rows, index], kind="stable")]))
-    return curves
 
 
 def _swept_point(space: Space) -> tuple[np.ndarray, np.ndarray]:
