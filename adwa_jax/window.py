@@ -8,6 +8,7 @@ import jax.numpy as jnp
 
 from adwa_jax.checks import require, require_numbers
 from adwa_jax.grid import Scalar
+from adwa_jax.native import whole
 
 
 @partial(
@@ -62,5 +63,8 @@ def _samples(value: jax.Array, reach: Scalar, least: Scalar, most: Scalar,
     # A robot already beyond its limits gets the one value that brings it nearest to them.
     low = jnp.clip(least, value - reach, value + reach)
     high = jnp.clip(most, value - reach, value + reach)
+    # As changes of the present value, each of which is rounded once: speeds are sums of hundreds of them.
+    down, up = jnp.clip(least - value, -reach, reach), jnp.clip(most - value, -reach, reach)
     share = jnp.arange(count, dtype=jnp.float32) / max(count - 1, 1)
-    return low * (1.0 - share) + high * share
+    change = whole(lambda: down * (1.0 - share) + up * share)  # once: a command is one of its samples to the last bit
+    return jnp.clip(value + change, low, high)
