@@ -10,7 +10,7 @@ demo: $(STAMP)
 	$(BIN)/adwa demo --out out/demo
 
 test: $(STAMP)
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile
 
 # Beside other programs, some of which are installed for it.
 bench: $(STAMP)
