@@ -66,18 +66,17 @@ def judge_pairs(scenarios: Sequence[Scenario], candidates: Sequence[Constants], 
     """
     keep_compiled()
     candidates = [jax.tree.map(np.float32, candidate) for candidate in candidates]
-    table = _Table(len(candidates), len(scenarios), progress)
+    table = Table(len(candidates), len(scenarios), progress)
     count = usable_cores() if workers is None else workers
-    plans = 0
     for program, pairs in pairs_by_program(scenarios, candidates, options).items():
         if table.stop:
             break
         planner = Planner(scenarios, candidates, program.options, program.shape, pairs)
         queue = _Queue(planner, candidates, pairs, table)
         width = lanes_of(program) if lanes is None else lanes
-        _in_threads(partial(_work, queue, program.options, width, table), min(count, len(pairs)), table)
-        plans += planner.plans_made
-    return Judged(table.columns, table.done, plans)
+        in_threads(partial(_work, queue, program.options, width, table), min(count, len(pairs)), table)
+        table.count(planner.plans_made)
+    return table.judged()
 
 
 def usable_cores() -> int:
@@ -117,18 +116,19 @@ def pairs_by_program(scenarios: Sequence[Scenario], candidates: Sequence[Constan
     return members
 
 
-class _Table:
+class Table:
     """Results as they come in; safe to use from several threads."""
 
     def __init__(self, candidates: int, scenarios: int, progress: Progress | None):
         self.columns: dict[str, np.ndarray] = {}
         self.done = np.zeros((candidates, scenarios), np.bool_)
         self.stop = False  # set once, to end the run after the blocks in progress
+        self._plans = 0
         self._progress, self._reported = progress, -1
         self._lock = threading.Lock()
 
     def write(self, pairs: Sequence[Pair], rows: dict[str, np.ndarray]) -> None:
-        """rows: name -> [len(pairs)]."""
+        """What came of some pairs. rows: name -> [len(pairs)]."""
         at = tuple(np.array(pairs, np.int64).T)
         with self._lock:
             for name, values in rows.items():
@@ -136,6 +136,15 @@ class _Table:
                     self.columns[name] = np.zeros(self.done.shape, values.dtype)
                 self.columns[name][at] = values
             self.done[at] = True
+
+    def count(self, plans: int) -> None:
+        """So many plans more were made."""
+        with self._lock:
+            self._plans += plans
+
+    def judged(self) -> Judged:
+        """All that has come in."""
+        return Judged(self.columns, self.done, self._plans)
 
     def report(self) -> None:
         """Tell how far the work is, if it is farther than last time."""
@@ -145,7 +154,7 @@ class _Table:
             self._progress(done, self.done.size)
 
 
-def _in_threads(work: Callable[[], None], count: int, table: _Table) -> None:
+def in_threads(work: Callable[[], None], count: int, table: Table) -> None:
     """Run `count` workers to their end, or, once the user interrupts, to the end of their blocks."""
     failed: list[BaseException] = []
 
@@ -180,7 +189,7 @@ class _Held(NamedTuple):
 class _Queue:
     """The pairs of one program in order, handed out with their plans; safe to use from several threads."""
 
-    def __init__(self, planner: Planner, candidates: Sequence[Constants], pairs: Sequence[Pair], table: _Table):
+    def __init__(self, planner: Planner, candidates: Sequence[Constants], pairs: Sequence[Pair], table: Table):
         self._planner, self._candidates, self._table = planner, candidates, table
         self._waiting = iter(pairs)
         self._lock = threading.Lock()
@@ -197,7 +206,7 @@ class _Queue:
         return _Held(pair, planned.figures), Task(planned.scenario, planned.plan, self._candidates[pair.candidate])
 
 
-def _work(queue: _Queue, options: Options, width: int, table: _Table) -> None:
+def _work(queue: _Queue, options: Options, width: int, table: Table) -> None:
     """One worker: keep `width` lanes busy until the queue is empty and the last of them has ended."""
     lanes: Lanes | None = None
     held: dict[int, _Held] = {}  # by lane
@@ -225,7 +234,7 @@ def _with(lanes: Lanes | None, tasks: list[Task], places: list[int], options: Op
     return _fill(lanes, rows, np.array(places + [0] * missing, np.int32), np.int32(len(tasks)))
 
 
-def _hand_in(lanes: Lanes, held: dict[int, _Held], table: _Table) -> None:
+def _hand_in(lanes: Lanes, held: dict[int, _Held], table: Table) -> None:
     """Write down the episodes that have ended, and let go of their lanes."""
     outcome = np.asarray(lanes.state.outcome)
     ended = [lane for lane in held if outcome[lane] != RUNNING]

@@ -1,9 +1,8 @@
 """What a job file means, and what of it cannot be: planner, space, goals, suites; checks across its tables."""
 
 import hashlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass
-from difflib import get_close_matches
 from pathlib import Path
 
 import jax
@@ -12,11 +11,11 @@ import numpy as np
 from adwa_jax.presets import Preset
 from adwa_jax.scenario import Scenario
 from scenarios.errors import InputError
-from scenarios.formats.reading import shown
+from scenarios.hiding import hide
 from scenarios.suite import SUITE_NAMES, Suite
 from tuning.choice import mistakes as choice_mistakes
-from tuning.job_file import ConstraintTable, Job, ObjectiveTable, SuiteTable, refused
-from tuning.objectives import DEFAULT_OBJECTIVES, Constraint, Goals, Statistic, measures_of
+from tuning.job_file import ConstraintTable, Job, ObjectiveTable, SuiteTable, nearest, placed, refused
+from tuning.objectives import DEFAULT_OBJECTIVES, Constraint, Goals, Statistic
 from tuning.options import Vehicle, configured, reach_of
 from tuning.plans_only import PLANNED
 from tuning.sources import read_suite
@@ -25,7 +24,9 @@ from tuning.store import FIGURES, TILE_WIDTH
 from tuning.suite_files import DEFAULT_COUNT
 from tuning.weights_file import COUNTS
 
-MEASURES = measures_of(tuple(FIGURES))
+MOST = {"success": 1.0, "collision": 1.0, "hit_while_stopped": 1.0, "spl": 1.0, "barn_score": 0.5}
+"""Measures that have an upper bound."""
+SIGNED = ("least_clearance", "mean_clearance")  # all others are 0 at least
 Progress = Callable[[int, int], None]
 
 
@@ -53,16 +54,31 @@ class Setup:
         return (*PLANNED, "outcome") if self.plans_only else tuple(FIGURES)
 
 
-def mistakes_of(job: Job, folder: Path) -> list[str]:
-    """Mistakes that no table shows by itself, "dotted path: value; rule; remedy" each."""
-    found = [*_measure_mistakes(job), *_overlaps(job, folder), *_racing_mistakes(job)]
-    try:
-        config = planner_of(job, folder)
-    except InputError as error:
-        return [*found, f"planner: {error}"]
-    parameters = list(_parameter_mistakes(job, config))
-    parameters = parameters or list(_failing("parameters", lambda: space_of(job, config)))
-    return [*found, *parameters, *choice_mistakes(job.choice, goals_of(job)), *_budget_mistakes(job)]
+def mistakes_of(job: Job, folder: Path, wrong: Collection[int | str] = ()) -> list[str]:
+    """Mistakes that no table shows by itself, "dotted path: value; rule; remedy" each.
+
+    wrong: tables that the job lacks for their own mistakes; what depends on them is not looked at.
+    """
+    checks: tuple[tuple[set[str], Iterable[str]], ...] = (
+        ({"objectives"}, _repeated_objectives(job)),
+        ({"constraints"}, _impossible_constraints(job)),
+        ({"training", "held_out"}, _overlaps(job, folder)),
+        ({"training", "method"}, _racing_mistakes(job)),
+        ({"planner"}, _parameter_mistakes(job, folder)),
+        ({"objectives", "choice"}, _choice_mistakes(job)),
+        ({"training", "method"}, _budget_mistakes(job)),
+    )
+    return [mistake for tables, found in checks if tables.isdisjoint(wrong) for mistake in found]
+
+
+def remarks_of(space: Space) -> list[str]:
+    """What is no mistake, but may not be meant: default constants outside their ranges."""
+    low, high = (np.array([getattr(parameter, end) for parameter in space.parameters]) for end in ("low", "high"))
+    inside = np.clip(space.default, low, high)
+    return [f"parameters.{name}: the default, {default:g}, is outside its range; the default candidate is judged with "
+            f"it all the same, and where a method begins at the default it begins at {nearest_in:g}"
+            for name, default, nearest_in in zip(space.names, space.default, inside, strict=True)
+            if np.float32(default) != np.float32(nearest_in)]  # fmt: skip
 
 
 def planner_of(job: Job, folder: Path) -> Preset:
@@ -132,7 +148,7 @@ def _part(path: Path, place: str, entry: SuiteTable, folder: Path, config: Prese
     try:
         work = read_suite(entry.source(folder), reach_of(config.constants.robot), quiet, progress)
     except InputError as error:
-        raise refused(path, [f"{place}: {error}"]) from None
+        raise refused(path, [placed(place, error)]) from None
     return _Part(place, work.suite, work.y_down)
 
 
@@ -146,25 +162,52 @@ def _constraint(table: ConstraintTable) -> Constraint:
     return Constraint(Statistic(table.measure, "min", table.worst_share), float(table.at_most or 0.0))
 
 
-def _measure_mistakes(job: Job) -> Iterator[str]:
-    for table, entries in (("objectives", job.objectives or []), ("constraints", job.constraints)):
-        for index, entry in enumerate(entries):
-            if entry.measure not in MEASURES:
-                yield (f"{table}.{index}.measure: {shown(entry.measure)}; must be one of {', '.join(MEASURES)}; "
-                       f"{_near(entry.measure, MEASURES)}")  # fmt: skip
+def _repeated_objectives(job: Job) -> Iterator[str]:
     labels = [_objective(entry).label for entry in job.objectives or []]
     for index, label in enumerate(labels):
         if label in labels[:index]:
             yield f"objectives.{index}: {label}; is there already; remove it"
 
 
-def _parameter_mistakes(job: Job, config: Preset) -> Iterator[str]:
+def _impossible_constraints(job: Job) -> Iterator[str]:
+    """Those that nothing can hold, by themselves or beside another: no worst share changes that."""
+    entries = [(f"constraints.{index}", entry) for index, entry in enumerate(job.constraints)]
+    upper = [(place, entry.measure, entry.at_most) for place, entry in entries if entry.at_most is not None]
+    lower = [(place, entry.measure, entry.at_least) for place, entry in entries if entry.at_least is not None]
+    for place, measure, bound in upper:
+        if bound < 0.0 and measure not in SIGNED:
+            yield f"{place}.at_most: {bound:g}; {measure} is never below 0; raise it"
+    for place, measure, bound in lower:
+        if bound > MOST.get(measure, bound):
+            yield f"{place}.at_least: {bound:g}; {measure} is never above {MOST[measure]:g}; lower it"
+        for other, same, most in upper:
+            if same == measure and bound > most:
+                yield (f"{place}.at_least: {bound:g}; {measure} cannot be so and at most {most:g}, as {other}.at_most "
+                       "asks for; lower it, raise the other, or remove one")  # fmt: skip
+
+
+def _choice_mistakes(job: Job) -> Iterator[str]:
+    yield from choice_mistakes(job.choice, goals_of(job))
+
+
+def _parameter_mistakes(job: Job, folder: Path) -> Iterator[str]:
+    try:
+        config = planner_of(job, folder)
+    except InputError as error:
+        yield placed("planner", error)
+        return
+    found = list(_single_mistakes(job, config))
+    yield from found or _failing("parameters", lambda: space_of(job, config))
+
+
+def _single_mistakes(job: Job, config: Preset) -> Iterator[str]:
+    """Of each parameter by itself."""
     names = tunable(config.options.rules)
     for name, table in job.parameters.items():
         place = f"parameters.{name}"
         if name not in names:
             yield (f"{place}: has no effect under preset {job.planner.preset}; must be one of {', '.join(names)}; "
-                   f"{_near(name, names)}")  # fmt: skip
+                   f"{nearest(name, names)}")  # fmt: skip
             continue
         yield from _failing(place, lambda name=name, table=table: Parameter(name, table.low, table.high, table.scale))
         low, high = COUNTS.get(name, (0, table.high))
@@ -210,12 +253,17 @@ def _overlaps(job: Job, folder: Path) -> Iterator[str]:
 
 
 def _shared(training: Suite, held_out: Suite) -> Iterator[str]:
-    known = {_content(scenario): name for scenario, name in zip(training.scenarios, training.names, strict=True)}
-    same = [(name, known[content]) for scenario, name in zip(held_out.scenarios, held_out.names, strict=True)
-            if (content := _content(scenario)) in known]  # fmt: skip
+    known = {_world(scenario): name for scenario, name in zip(training.scenarios, training.names, strict=True)}
+    same = [(name, known[world]) for scenario, name in zip(held_out.scenarios, held_out.names, strict=True)
+            if (world := _world(scenario)) in known]  # fmt: skip
     if same:
         yield (f"held_out: {len(same)} of {len(held_out.names)} scenarios are training scenarios too ({same[0][0]} is "
                f"{same[0][1]}); none may be; choose other seeds, maps or files")  # fmt: skip
+
+
+def _world(scenario: Scenario) -> bytes:
+    """A checksum of map and task, whatever the robot knows of them beforehand."""
+    return _content(hide(scenario))
 
 
 def _content(scenario: Scenario) -> bytes:
@@ -236,10 +284,4 @@ def _failing(place: str, make: Callable[[], object]) -> Iterator[str]:
     try:
         make()
     except InputError as error:
-        field, _, rest = str(error).partition(": ")
-        yield f"{place}.{field}: {rest}" if field.isidentifier() else f"{place}: {error}"
-
-
-def _near(value: str, names: tuple[str, ...]) -> str:
-    near = get_close_matches(value, names, n=1)
-    return f"did you mean {near[0]}?" if near else "remove or rename it"
+        yield placed(place, error)

@@ -3,27 +3,51 @@
 Paths in it are relative to its folder. Every mistake is told, a line each: file: dotted path: value; rule; remedy.
 """
 
-import tomllib
-from collections.abc import Iterable, Mapping
+import re
+from collections.abc import Collection, Iterable, Mapping
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
 
 from adwa_jax.presets import PRESETS, ROBOTS
 from scenarios.errors import InputError
-from scenarios.formats.reading import bad_input, shown
+from scenarios.formats.reading import read_toml, shown
 from tuning.choice import ChoiceSettings
 from tuning.methods import METHODS, settings_of
+from tuning.objectives import measures_of
 from tuning.options import FARTHEST, FASTEST
 from tuning.sources import MOST_OBSTACLES, Source
+from tuning.store import FIGURES
 from tuning.suite_files import LARGEST_SEED
 
 MOST_EPISODES = 10**9
+ON_MAP = ("unknown", "resolution", "unknown_obstacles", "movers")  # what only a suite on one's own map is made with
 Share = Annotated[float, Field(gt=0.0, le=1.0)]
 Seed = Annotated[int, Field(ge=0, le=LARGEST_SEED)]
 Name = Annotated[str, Field(min_length=1, max_length=1024, pattern=r"^[^\x00]*$")]  # of a suite or a file
+
+
+def one_of(names: Collection[str]) -> AfterValidator:
+    """Refuses every other name, with the nearest of them."""
+
+    def checked(value: str) -> str:
+        if value not in names:
+            raise ValueError(f"{shown(value)}; must be one of {', '.join(names)}; "
+                             f"{nearest(value, names, 'choose one of them')}")  # fmt: skip
+        return value
+
+    return AfterValidator(checked)
+
+
+def nearest(value: str, names: Collection[str], otherwise: str = "remove or rename it") -> str:
+    """The remedy for a misspelt name."""
+    near = get_close_matches(value, names, n=1)
+    return f"did you mean {near[0]}?" if near else otherwise
+
+
+Measure = Annotated[str, one_of(measures_of(tuple(FIGURES)))]
 
 
 class Table(BaseModel):
@@ -35,8 +59,8 @@ class Table(BaseModel):
 class PlannerTable(Table):
     """The planner whose constants are tuned; what is not tuned stays as it is here."""
 
-    preset: str = "extended"
-    robot: str | None = None
+    preset: Annotated[str, one_of(PRESETS)] = "extended"
+    robot: Annotated[str, one_of(ROBOTS)] | None = None
     v_max: float | None = Field(default=None, gt=0.0, le=FASTEST)  # [m/s]
     sensor_range: float | None = Field(default=None, gt=0.0, le=FARTHEST)  # [m]
     weights: Name | None = None  # a file of constants to start from
@@ -57,11 +81,15 @@ class SuiteTable(Table):
     movers: int = Field(5, ge=0, le=MOST_OBSTACLES)
 
     @model_validator(mode="after")
-    def _one_kind(self) -> "SuiteTable":
+    def _one_kind_and_its_keys(self) -> "SuiteTable":
         given = [name for name in ("suite", "suite_file", "map") if getattr(self, name) is not None]
         if len(given) != 1:
             raise ValueError(f"{', '.join(given) or 'none'} given; exactly one of suite, suite_file and map says what "
                              "to drive; give one")  # fmt: skip
+        unused = [name for name in ON_MAP if name in self.model_fields_set]
+        if unused and self.map is None:
+            raise ValueError(f"{', '.join(unused)}: without effect on {self.label}; only suites on a map are made with "
+                             f"{'them' if len(unused) > 1 else 'it'}; leave out, or name a map")  # fmt: skip
         return self
 
     @property
@@ -93,7 +121,7 @@ class ParameterTable(Table):
 class ObjectiveTable(Table):
     """What is to be small or large."""
 
-    measure: str
+    measure: Measure
     direction: Literal["min", "max"]
     worst_share: Share = 1.0
 
@@ -101,7 +129,7 @@ class ObjectiveTable(Table):
 class ConstraintTable(Table):
     """What must hold."""
 
-    measure: str
+    measure: Measure
     at_least: float | None = None
     at_most: float | None = None
     worst_share: Share = 1.0
@@ -119,7 +147,7 @@ class MethodTable(BaseModel):
 
     model_config = Table.model_config | ConfigDict(extra="allow")
 
-    name: str
+    name: Annotated[str, one_of(METHODS)]
     episodes: int = Field(ge=2, le=MOST_EPISODES)  # on training scenarios, those of the default constants included
     racing: bool = False
 
@@ -148,13 +176,14 @@ def load_job(path: Path, folder: Path | None = None) -> Job:
     """The job in a file. folder: that its paths are relative to, if not its own. InputError lists all mistakes."""
     from tuning.job_checks import mistakes_of  # builds on this module
 
-    content = _read(path)
-    mistakes = _unknown_names(content)
+    content = read_toml(path, "a job, which is a TOML file,", "mend the line")
     try:
-        job = Job.model_validate(content)
+        job, wrong, mistakes = Job.model_validate(content), set(), []
     except ValidationError as error:
-        raise refused(path, _told(error) + mistakes) from None
-    mistakes = mistakes or mistakes_of(job, folder or path.resolve().parent)
+        job, wrong = _without(content, [found["loc"] for found in error.errors()])
+        mistakes = _told(error)
+    mistakes += [*_wrong_settings(content.get("method")),
+                 *mistakes_of(job, folder or path.resolve().parent, wrong)]  # fmt: skip
     if mistakes:
         raise refused(path, mistakes)
     return job
@@ -165,30 +194,27 @@ def refused(path: Path, mistakes: Iterable[str]) -> InputError:
     return InputError("\n".join(f"{path}: {' '.join(mistake.split())}" for mistake in mistakes))
 
 
-def _read(path: Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise bad_input(path, f"cannot be read ({error.strerror})", "a job is a TOML file",
-                        "name an existing one") from None
-    except (ValueError, RecursionError) as error:
-        raise bad_input(path, f"not TOML ({error})", "a job is a TOML file", "mend the line") from None
+def placed(place: str, mistake: object) -> str:
+    """A mistake at a place, or at the key there that its text begins with; options of commands are keys here."""
+    text = re.sub(r"(?:^|(?<=[ (]))--([a-z][a-z-]*)", lambda option: option[1].replace("-", "_"), str(mistake))
+    key, _, rest = text.partition(": ")
+    return f"{place}.{key}: {rest}" if key.isidentifier() else f"{place}: {text}"
 
 
-def _unknown_names(content: Mapping[str, Any]) -> list[str]:
-    """Mistakes in names from lists that other modules keep, and in the method's own settings."""
-    choices = {("planner", "preset"): PRESETS, ("planner", "robot"): ROBOTS, ("method", "name"): METHODS}
-    found = []
-    for (table, key), names in choices.items():
-        value = content[table].get(key) if isinstance(content.get(table), dict) else None
-        if isinstance(value, str) and value not in names:
-            found.append(f"{table}.{key}: {shown(value)}; must be one of {', '.join(names)}; "
-                         f"{_remedy(value, names, 'choose one of them')}")  # fmt: skip
-    return found + _wrong_settings(content.get("method"))
+def _without(content: Mapping[str, Any], places: Iterable[tuple[int | str, ...]]) -> tuple[Job, set[int | str]]:
+    """The job without the tables, and without the single parameters, in which there are mistakes; and those tables."""
+    wrong = {place[0] for place in places if place[0] != "parameters"}
+    names = {place[1] for place in places if place[0] == "parameters" and len(place) > 1}
+    parameters = content.get("parameters")
+    parameters = parameters if isinstance(parameters, dict) else {}
+    kept = {**content, "parameters": {name: table for name, table in parameters.items() if name not in names}}
+    tables = {name: TypeAdapter(field.annotation).validate_python(kept[name])
+              for name, field in Job.model_fields.items() if name in kept and name not in wrong}  # fmt: skip
+    return Job.model_construct(**tables), wrong
 
 
 def _wrong_settings(method: object) -> list[str]:
-    """Of the method's own settings."""
+    """Mistakes in the method's own settings."""
     if not isinstance(method, dict) or method.get("name") not in METHODS:
         return []
     model = settings_of(method["name"])
@@ -211,9 +237,9 @@ def _sentence(found: Mapping[str, Any], place: tuple[str, ...], known: tuple[str
         return f"{where}: missing; it has no default; add it"
     if kind == "extra_forbidden":
         names = known or _names_at(found["loc"][:-1])
-        return f"{where}: unknown key; the keys are {', '.join(names)}; {_remedy(str(found['loc'][-1]), names)}"
+        return f"{where}: unknown key; the keys are {', '.join(names)}; {nearest(str(found['loc'][-1]), names)}"
     if kind == "value_error":  # ours
-        return f"{where}: {found['ctx']['error']}"
+        return placed(where, found["ctx"]["error"])
     rule = found["msg"].removeprefix("Input should be ").removeprefix("Value error, ")
     rule = rule if rule.startswith("must") else f"must be {rule[:1].lower()}{rule[1:]}"
     return f"{where}: {value}; {rule}; correct it"
@@ -233,8 +259,3 @@ def _model_in(annotation: Any) -> type[BaseModel]:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation
     return next(_model_in(part) for part in get_args(annotation) if part not in (str, type(None)))
-
-
-def _remedy(value: str, names: Iterable[str], otherwise: str = "remove or rename it") -> str:
-    near = get_close_matches(value, list(names), n=1)
-    return f"did you mean {near[0]}?" if near else otherwise

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from importlib import metadata
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from tuning.outputs import write_whole
 
 JOB, ENVIRONMENT, LOCK, LOG, REMEMBERED = "job.toml", "environment.json", "lock", "log.jsonl", "remembered"
 TRAINING, HELD_OUT = "training.zarr", "held_out.zarr"
+TRIES, MOMENT = 5, 0.1  # [s] between them: whoever only looks at a lock has it for an instant
 PACKAGES = ("adwa-jax", "jax", "jaxlib", "numpy", "scipy", "pymoo", "optax", "zarr", "xarray")
 
 
@@ -30,19 +31,26 @@ PACKAGES = ("adwa-jax", "jax", "jaxlib", "numpy", "scipy", "pymoo", "optax", "za
 def locked(folder: Path) -> Iterator[None]:
     """The folder for this process alone. InputError names the process that has it."""
     with open(folder / LOCK, "a+", encoding="utf-8") as file:
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise InputError(f"{folder}: process {holder(folder)} works on it; one process at a time may; wait for "
-                             f"it, or end it: kill {holder(folder)}") from None  # fmt: skip
+        if not any(_taken(file) or time.sleep(MOMENT) for _ in range(TRIES)):
+            process = holder(folder) or "another"
+            raise InputError(f"{folder}: process {process} works on it; one process at a time may; wait for it, or "
+                             f"end it: kill {process}")  # fmt: skip
         file.truncate(0)
         file.write(str(os.getpid()))
         file.flush()
         yield
 
 
+def _taken(file: IO[str]) -> bool:
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True
+
+
 def holder(folder: Path) -> str | None:
-    """The process that works on the folder; None if none does."""
+    """The process that works on the folder; None if none does. To look takes the lock too, for an instant."""
     try:
         with open(folder / LOCK, encoding="utf-8") as file:
             try:
@@ -62,8 +70,10 @@ def storing(folder: Path) -> Iterator[None]:
     except BrokenPipeError:
         raise
     except OSError as error:
-        raise InputError(f"{folder}: {error.strerror or error}; a job keeps its results there; make room or mend the "
-                         f"permissions, then go on: adwa tune resume {folder}") from error  # fmt: skip
+        begun = (folder / JOB).exists()
+        remedy = (f"make room or mend the permissions, then go on: adwa tune resume {folder}" if begun else
+                  "make room, mend the permissions or name another folder, then run the job again")  # fmt: skip
+        raise InputError(f"{folder}: {error.strerror or error}; a job keeps its results there; {remedy}") from error
 
 
 def require_free(folder: Path) -> None:

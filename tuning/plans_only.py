@@ -3,12 +3,10 @@
 Dimension letters: W candidates; S scenarios.
 """
 
-import threading
-from collections.abc import Iterable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from itertools import groupby
 
 import numpy as np
 
@@ -17,8 +15,8 @@ from adwa_jax.constants import Constants, Options
 from adwa_jax.episode import Outcome
 from adwa_jax.scenario import Scenario
 from tuning.compiled import keep_compiled
-from tuning.engine import Judged, Program, Progress, pairs_by_program, usable_cores
-from tuning.plans_ahead import Pair, Planner
+from tuning.engine import Judged, Program, Progress, Table, in_threads, pairs_by_program, usable_cores
+from tuning.plans_ahead import Pair, Planned, Planner
 
 PLANNED = ("optimal_length", "planned_length", "planned_length_ratio", "key_point_length", "key_point_count",
            "expansions", "planned_breaking_points", "planned_danger_points", "planned_key_point_breaking_points",
@@ -33,15 +31,18 @@ def judge_plans(scenarios: Sequence[Scenario], candidates: Sequence[Constants], 
     """
     keep_compiled()
     options = replace(options, plan=replace(options.plan, subdivision=1))  # nothing is looked up in the field
-    collected = _Collected(len(candidates), len(scenarios), progress)
+    table = Table(len(candidates), len(scenarios), progress)
     count = usable_cores() if workers is None else workers
-    with ThreadPoolExecutor(count) as pool:
-        parts = [partial(_plan, scenarios, candidates, program, part, collected)
-                 for program, pairs in pairs_by_program(scenarios, candidates, options).items()
-                 for part in _shares(pairs, count)]  # fmt: skip
-        for future in [pool.submit(part) for part in parts]:
-            future.result()
-    return Judged(collected.columns, collected.done, collected.plans)
+    parts = iter([partial(_plan, scenarios, candidates, program, part, table)
+                  for program, pairs in pairs_by_program(scenarios, candidates, options).items()
+                  for part in _shares(pairs, count)])  # fmt: skip
+
+    def work() -> None:
+        for part in parts:  # each is taken by one thread
+            part()
+
+    in_threads(work, count, table)
+    return table.judged()
 
 
 def _shares(pairs: Sequence[Pair], count: int) -> Iterable[Sequence[Pair]]:
@@ -52,37 +53,19 @@ def _shares(pairs: Sequence[Pair], count: int) -> Iterable[Sequence[Pair]]:
         yield [pair for pair in pairs if pair.scenario in kept]
 
 
-class _Collected:
-    """Figures as they come in; safe to use from several threads."""
-
-    def __init__(self, candidates: int, scenarios: int, progress: Progress | None):
-        self.columns: dict[str, np.ndarray] = {}
-        self.done = np.zeros((candidates, scenarios), np.bool_)
-        self.plans = 0
-        self._progress, self._lock = progress, threading.Lock()
-
-    def write(self, pair: Pair, figures: Mapping[str, Any]) -> None:
-        with self._lock:
-            for name, value in figures.items():
-                if name not in self.columns:
-                    self.columns[name] = np.zeros(self.done.shape, np.asarray(value).dtype)
-                self.columns[name][pair] = value
-            self.done[pair] = True
-            if self._progress and pair.candidate == 0:
-                self._progress(int(self.done.sum()), self.done.size)
-
-    def count(self, plans: int) -> None:
-        with self._lock:
-            self.plans += plans
-
-
 def _plan(scenarios: Sequence[Scenario], candidates: Sequence[Constants], program: Program, pairs: Sequence[Pair],
-          collected: _Collected) -> None:
-    """Plan some pairs of one program."""
+          table: Table) -> None:
+    """Plan some pairs of one program, scenario after scenario, until the run is to end."""
     planner = Planner(scenarios, candidates, program.options, program.shape, pairs)
-    for pair in pairs:
-        planned = planner.planned(pair)
-        found = planned.plan.search.status == Status.FOUND
-        outcome = np.int32(Outcome.REACHED if found else Outcome.NO_PATH)
-        collected.write(pair, planned.figures | {"outcome": outcome})
-    collected.count(planner.plans_made)
+    for _, group in groupby(pairs, key=lambda pair: pair.scenario):
+        if table.stop:
+            break
+        some = list(group)
+        rows = [_figures(planner.planned(pair)) for pair in some]
+        table.write(some, {name: np.stack([row[name] for row in rows]) for name in rows[0]})
+    table.count(planner.plans_made)
+
+
+def _figures(planned: Planned) -> dict[str, np.ndarray]:
+    found = planned.plan.search.status == Status.FOUND
+    return planned.figures | {"outcome": np.int32(Outcome.REACHED if found else Outcome.NO_PATH)}

@@ -27,7 +27,7 @@ from tuning.job_folder import (
     require_unchanged,
     storing,
 )
-from tuning.search_job import search
+from tuning.search_job import begun, search
 from tuning.store import damaged_tiles
 
 
@@ -70,10 +70,15 @@ def report_job(folder: Path, quiet: bool = False) -> Findings:
 
 
 def read_setup(file: Path, home: Path, quiet: bool = False) -> Setup:
-    """A job file and its suites, whole; home: the folder that its paths are relative to."""
+    """A job file and its suites, whole; home: the folder that its paths are relative to.
+
+    InputError for all that would be refused when it runs.
+    """
     job = load_job(file, home)
     with progress_bar("making scenarios", quiet) as progress:
-        return set_up(job, file, home, quiet, progress)
+        setup = set_up(job, file, home, quiet, progress)
+    begun(setup, file)
+    return setup
 
 
 def _reread(folder: Path, quiet: bool) -> Setup:

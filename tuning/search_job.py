@@ -14,7 +14,7 @@ from tuning.job_checks import Setup
 from tuning.job_file import refused
 from tuning.job_folder import JOB, TRAINING, Log, remember
 from tuning.methods import CUT_ANYWHERE, method_named
-from tuning.methods.method import Problem, Search
+from tuning.methods.method import Problem, Remember, Search, computed_anew
 from tuning.objectives import Goals, Scores
 from tuning.racing import Judge, raced
 from tuning.store import TILE_WIDTH, Store
@@ -29,16 +29,14 @@ def search(folder: Path, setup: Setup, log: Log, quiet: bool) -> None:
     What is in the folder's store is read, not driven. On KeyboardInterrupt all whole tiles are kept.
     """
     began = time.perf_counter()
-    scenarios, budget = len(setup.training.scenarios), setup.job.method.episodes
-    method = _begun(folder, setup)
-    points = _first(method, setup, folder)
+    method, points = begun(setup, folder / JOB, partial(remember, folder))
     store = Store(folder / TRAINING, setup.space.names, setup.training.names, setup.figures)
     with progress_bar(f"tuning on {setup.training.name}", quiet) as progress:
-        judge = TiledJudge(store, setup.training, setup.space, log, budget, progress, setup.plans_only)
+        judge = TiledJudge(store, setup.training, setup.space, log, setup.job.method.episodes, progress,
+                          setup.plans_only)
         past = _Past(setup, judge, log)
         past.generation(setup.space.default[None], racing=False)
-        while points is not None and past.spent + len(points) * scenarios <= budget:
-            scores = past.generation(setup.space.values(points), setup.job.method.racing)
+        while points is not None and (scores := _scores(past, points, setup)) is not None:
             try:
                 points = method.send(scores)
             except StopIteration:
@@ -110,26 +108,49 @@ def _front_of(before: dict[str, np.ndarray] | None, columns: dict[str, np.ndarra
     return {name: column[members] for name, column in joined.items()}
 
 
-def _begun(folder: Path, setup: Setup) -> Search:
+def begun(setup: Setup, file: Path, keep: Remember = computed_anew) -> tuple[Search, np.ndarray | None]:
+    """The method and its first generation, [C, D] points of the unit cube; None if it asks for nothing.
+
+    InputError, for the job file, if the method cannot do with the parameters, or the budget does not pay for that.
+    """
     job, scenarios = setup.job, len(setup.training.scenarios)
     left = job.method.episodes - scenarios  # the default constants come first
     fewest = TILE_WIDTH if job.method.racing and job.method.name in CUT_ANYWHERE else scenarios
-    problem = Problem(setup.space, setup.goals, job.seed, left // fewest, setup.training, job.method.settings,
-                      partial(remember, folder))  # fmt: skip
-    return method_named(job.method.name)(problem)
-
-
-def _first(method: Search, setup: Setup, folder: Path) -> np.ndarray | None:
-    """The first generation; InputError if the budget does not pay for it."""
+    problem = Problem(setup.space, setup.goals, job.seed, left // fewest, setup.training, job.method.settings, keep)
+    method = method_named(job.method.name)(problem)
     try:
         points = next(method, None)
     except InputError as error:
-        raise refused(folder / JOB, [str(error)]) from None
-    scenarios, budget = len(setup.training.scenarios), setup.job.method.episodes
+        raise refused(file, [str(error)]) from None
     count = 0 if points is None else len(points)
     needed = (1 + count) * scenarios
-    if needed > budget:
-        raise refused(folder / JOB, [f"method.episodes: {budget}; the default constants and the first generation of "
-                                     f"{count} candidates on {scenarios} scenarios take {needed}; raise "
-                                     "it, or make generations smaller"])  # fmt: skip
-    return points
+    if needed > job.method.episodes:
+        raise refused(file, [f"method.episodes: {job.method.episodes}; the default constants and the first generation "
+                             f"of {count} candidates on {scenarios} scenarios take {needed}; raise it, or make "
+                             "generations smaller"])  # fmt: skip
+    return method, points
+
+
+def _scores(past: _Past, points: np.ndarray, setup: Setup) -> Scores | None:
+    """Scores of a generation; None once the budget is spent.
+
+    Where a race may have left too little for the whole of it, as many as can be paid for are judged, then as many of
+    the others as what that has left pays for: then less than a candidate's episodes stay unspent.
+    """
+    method, scenarios, parts = setup.job.method, len(setup.training.scenarios), []
+    while len(points):
+        count = min((method.episodes - past.spent) // scenarios, len(points))
+        if count < (1 if method.name in CUT_ANYWHERE else len(points)):
+            return None
+        parts.append(past.generation(setup.space.values(points[:count]), method.racing))
+        points = points[count:]
+    return _joined(parts)
+
+
+def _joined(parts: list[Scores]) -> Scores:
+    """Scores of parts of a generation."""
+    columns, counted = ([getattr(part, name) for part in parts] for name in ("columns", "counted"))
+    return Scores(np.concatenate([part.objectives for part in parts]),
+                  np.concatenate([part.violation for part in parts]),
+                  {name: np.concatenate([column[name] for column in columns]) for name in columns[0]},
+                  np.concatenate(counted))  # fmt: skip

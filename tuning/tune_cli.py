@@ -21,16 +21,19 @@ tune_app = typer.Typer(help="Tune constants: jobs that go on after a kill and en
 JobArgument = Annotated[Path, typer.Argument(metavar="JOB", help="The job file, TOML.")]
 FolderArgument = Annotated[Path, typer.Argument(metavar="DIR", help="The folder of a job.")]
 INTERRUPTED = 130  # exit code
+TOLD = {"generation": {"generation": int, "spent": int, "best": dict}, "block": {"seconds": float, "episodes": int}}
 RECENT = 20  # blocks of episodes, by which speed is told
 
 
 @tune_app.command("check")
 def check_command(job: JobArgument, quiet: QuietOption = False) -> None:
     """Check a job file whole, its suites included, and run nothing."""
+    from tuning.job_checks import remarks_of
     from tuning.run_job import read_setup
 
     setup = read_setup(job, job.resolve().parent, quiet)
     if not quiet:
+        print("".join(f"{job}: {remark}\n" for remark in remarks_of(setup.space)), end="")
         counts = {"training scenarios": setup.training.scenarios, "held-out scenarios": setup.held_out.scenarios,
                   "parameters": setup.space.parameters, "objectives": setup.goals.objectives}  # fmt: skip
         print(f"{job}: {', '.join(f'{len(things)} {name}' for name, things in counts.items())}")
@@ -80,25 +83,31 @@ def report_command(folder: FolderArgument, quiet: QuietOption = False) -> None:
 
 def status_lines(name: str, budget: int, events: list[dict[str, Any]], process: str | None) -> list[str]:
     """What the log of a job tells, for people."""
-    generations = [event for event in events if event["event"] == "generation"]
+    generations = _whole(events, "generation")
     spent = generations[-1]["spent"] if generations else 0
     ended = bool(events) and events[-1]["event"] == "end"
     state = "finished" if ended else f"process {process} works on it" if process else "stopped"
     lines = [f"{name}: {state}; generation {generations[-1]['generation'] if generations else '–'}, "
              f"{spent} of at most {budget} episodes ({spent / budget:.0%})"]  # fmt: skip
-    if generations and generations[-1]["best"]:
-        best = generations[-1]["best"]
+    best = generations[-1]["best"] if generations else {}
+    if {"objectives", "violation", "constants"} <= set(best):
         shown = [f"{label} {value:.4g}" for label, value in best["objectives"].items()]
         violated = f" (violates constraints by {best['violation']:.3g})" if best["violation"] else ""
         lines.append(f"best first objective: {', '.join(shown)}{violated}")
         lines.append("by " + ", ".join(f"{key} = {value:.4g}" for key, value in best["constants"].items()))
-    blocks = [event for event in events if event["event"] == "block"][-RECENT:]
+    blocks = _whole(events, "block")[-RECENT:]
     seconds = sum(block["seconds"] for block in blocks)
     if seconds and not ended:
         rate = sum(block["episodes"] for block in blocks) / seconds
         left = timedelta(seconds=round((budget - spent) / rate)) if rate else "unknown"
         lines.append(f"{rate:.0f} episodes a second; at most {left} left for the search")
     return lines
+
+
+def _whole(events: list[dict[str, Any]], kind: str) -> list[dict[str, Any]]:
+    """Events of a kind that have all that is told of them; a damaged log may hold others."""
+    return [event for event in events if event["event"] == kind
+            and all(isinstance(event.get(name), of) for name, of in TOLD[kind].items())]  # fmt: skip
 
 
 def _tell(folder: Path, findings: Findings, quiet: bool) -> None:

@@ -17,7 +17,6 @@
 A key that the preset's rules leave without effect is refused.
 """
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import fields, replace
 from pathlib import Path
@@ -32,7 +31,7 @@ from adwa_jax.presets import Preset, paper
 from adwa_jax.rules import Rules
 from adwa_jax.score import ScoreWeights
 from scenarios.errors import InputError
-from scenarios.formats.reading import bad_input, shown
+from scenarios.formats.reading import bad_input, read_toml, shown
 
 SCORE = tuple(field.name for field in fields(ScoreWeights))
 RULE = tuple(field.name for field in fields(WeightRule))
@@ -109,19 +108,9 @@ def parse_weight_rule(text: str) -> WeightRule:
     return _made("--weight-rule", WeightRule, dict(zip(RULE, numbers, strict=False)))
 
 
-def _read(path: Path) -> dict[str, object]:
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise bad_input(path, f"cannot be read ({error.strerror})", "weights are a TOML file",
-                        "name an existing one") from None
-    except (ValueError, RecursionError) as error:
-        raise bad_input(path, f"not TOML ({error})", "weights are a TOML file",
-                        "write lines such as: clearance = 0.4") from None
-
-
 def _numbers(path: Path) -> dict[str, float]:
-    return {key: _number(path, key, value) for key, value in _read(path).items()}
+    read = read_toml(path, "a TOML file of weights", "write lines such as: clearance = 0.4")
+    return {key: _number(path, key, value) for key, value in read.items()}
 
 
 def _number(path: Path, key: str, value: object) -> float:

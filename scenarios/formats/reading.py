@@ -1,6 +1,7 @@
 """Reading a user's files, and refusing bad ones in one line: where, what was found, the rule, the remedy."""
 
 import math
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -59,6 +60,14 @@ def read_lines(path: str | Path, kind: str) -> list[str]:
                         "check that this is the right file, uncompressed")
     lines = [line.removesuffix("\r") for line in text.split("\n")]
     return lines[:-1] if len(lines) > 1 and lines[-1] == "" else lines
+
+
+def read_toml(path: str | Path, kind: str, remedy: str) -> dict[str, Any]:
+    """The tables of a TOML file. Raises InputError as `read_lines` does, and with the line for what is not TOML."""
+    try:
+        return tomllib.loads("\n".join(read_lines(path, kind)))
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise bad_input(path, f"not TOML ({error})", f"{kind} is expected", remedy) from None
 
 
 def number(where: object, value: Any, rule: str, remedy: str) -> float:

@@ -7,7 +7,7 @@ import pytest
 from adwa_jax.presets import extended
 from scenarios.errors import InputError
 from scenarios.suite import make_suite, save_suite
-from tuning.job_checks import goals_of, planner_of, set_up, space_of
+from tuning.job_checks import goals_of, planner_of, remarks_of, set_up, space_of
 from tuning.job_file import load_job
 from tuning.objectives import DEFAULT_OBJECTIVES, Constraint, Statistic
 
@@ -101,7 +101,7 @@ MISTAKES = {
     "small budget": (("episodes = 30", "episodes = 5"), "method.episodes: 5; .* on 3 training scenarios take 6; .*"),
     "unknown method": (('"sobol"', '"sobel"'), "method.name: 'sobel'; must be one of .*; did you mean sobol?"),
     "setting of the method": (("episodes = 30", "episodes = 30\ngeneration = 3"),
-                              "method.generation: .*power of two.*"),
+                              "method.generation: 3; must be a power of two; try 64"),
     "unknown setting": (("episodes = 30", "episodes = 30\npopulation = 8"), "method.population: unknown key; .*"),
     "two kinds of suite": (('suite = "paper-15", count = 3', 'suite = "paper-15", map = "a.png", count = 3'),
                            "training.suites.0: suite, map given; exactly one .*; give one"),
@@ -112,6 +112,14 @@ MISTAKES = {
                     "constraints.0.worst_share: 1.5; must be less than or equal to 1; correct it"),
     "NaN": (("low = 0.02", "low = nan"), "parameters.clearance.low: nan; must be .*"),
     "integer scale": (('scale = "log"', 'scale = "integer"'), "parameters.clearance.scale: 'integer'; .*"),
+    "share in percent": (("at_least = 0.95", "at_least = 95"),
+                         "constraints.0.at_least: 95; success is never above 1; lower it"),
+    "below nothing": (("at_least = 0.95", "at_most = -0.1"),
+                      "constraints.0.at_most: -0.1; success is never below 0; raise it"),
+    "contradiction": (("[method]", '[[constraints]]\nmeasure = "success"\nat_most = 0.5\nworst_share = 0.1\n[method]'),
+                      "constraints.0.at_least: 0.95; .* at most 0.5, as constraints.1.at_most asks for; lower it, .*"),
+    "key of a map": (("count = 3", "count = 3, movers = 2"),
+                     "training.suites.0.movers: without effect on paper-15; .* a map .*; leave out, or name a map"),
     "no rule": (("[method]", "[choice]\nrule = \"best\"\n[method]"), "choice.rule: 'best'; must be .*"),
 }  # fmt: skip
 
@@ -123,15 +131,64 @@ def test_a_mistake_is_one_line_with_its_path_value_rule_and_remedy(written, mist
     assert re.fullmatch(expected.replace("?", r"\?"), line), line
 
 
-def test_mistakes_are_listed_together(written):
-    lines = told(written(("seed = 7", "sead = 7"), ("count = 3", "count = 0"), ('"extended"', '"best"'),
-                         ('"sobol"', '"sobel"')))  # fmt: skip
-    assert [line.split(":")[0] for line in lines] == ["training.suites.0.count", "sead", "planner.preset",
-                                                      "method.name"]  # fmt: skip
-    lines = told(written(("seed = 2", "seed = 1"), ("episodes = 30", "episodes = 3"), ("low = 0.02", "low = 0.0"),
-                         ('measure = "success"', 'measure = "luck"')))  # fmt: skip
-    assert [line.split(":")[0] for line in lines] == ["constraints.0.measure", "held_out.suites.0",
-                                                      "parameters.clearance.low", "method.episodes"]  # fmt: skip
+MANY = """\
+name = 1
+sead = 7
+
+[training]
+suites = [{suite = "paper-15", count = 3, seed = 1}]
+
+[held_out]
+suites = [{suite = "paper-15", count = 2, seed = 1}]
+
+[parameters]
+clearance = {low = 0.0, high = 0.5, scale = "log"}
+velocity = {low = 0.0, high = 1.0}
+forward = {low = "0", high = 1.0}
+
+[[objectives]]
+measure = "luck"
+direction = "min"
+
+[[constraints]]
+measure = "success"
+at_least = 5
+
+[method]
+name = "sobol"
+episodes = 3
+racing = true
+generation = 3
+
+[choice]
+rule = "best"
+"""
+
+
+def test_mistakes_of_every_kind_are_listed_together(written):
+    """What is wrong in one table hides no mistake in another, nor one of a parameter that of the next."""
+    places = [line.split(":")[0] for line in told(written(text=MANY))]
+    assert sorted(places) == [
+        "choice.rule", "constraints.0.at_least", "held_out.suites.0", "method.episodes", "method.generation",
+        "method.racing", "name", "objectives.0.measure", "parameters.clearance.low", "parameters.forward.low",
+        "parameters.velocity", "sead",
+    ]  # fmt: skip
+
+
+def test_a_mistake_in_a_table_raises_none_in_those_that_depend_on_it(written):
+    """Under the preset that is meant all is well."""
+    (line,) = told(written(('"extended"', '"papre"'), ("parameters.clearance", "parameters.velocity")))
+    assert line.startswith("planner.preset: 'papre'; ")
+
+
+def test_a_default_outside_its_range_is_remarked_on(written):
+    path = written(("low = 0.02", "low = 0.7"), ("high = 0.5", "high = 0.9"))
+    space = space_of(load_job(path), extended())
+    assert 0.0 < space.default[0] < 0.7
+    (remark,) = remarks_of(space)
+    assert re.fullmatch(rf"parameters\.clearance: the default, {space.default[0]:g}, is outside its range; .* at 0\.7",
+                        remark)  # fmt: skip
+    assert remarks_of(space_of(load_job(written()), extended())) == []
 
 
 @pytest.mark.parametrize("text", ["name = office", "a = 1\na = 2\n", "[[["])
@@ -140,14 +197,17 @@ def test_what_is_not_toml_is_told(written, text):
     assert re.search(r"not TOML \(.*line \d.*\)", line)
 
 
-def test_the_same_scenarios_by_another_name_are_refused(written, tmp_path):
+@pytest.mark.parametrize("sensed", ["", ", sensed_only = true"])
+def test_the_same_scenarios_by_another_name_are_refused(written, tmp_path, sensed):
     save_suite(make_suite("paper-15", 1, 2), tmp_path / "a.suite")
-    path = written(('suite = "paper-15", count = 2, seed = 2', 'suite_file = "a.suite"'))
+    path = written(('suite = "paper-15", count = 2, seed = 2', f'suite_file = "a.suite"{sensed}'))
     with pytest.raises(InputError, match=r"held_out: 2 of 2 scenarios are training scenarios too .*; choose other"):
         set_up(load_job(path), path, tmp_path, quiet=True)
 
 
-def test_a_suite_that_cannot_be_had_is_named_by_its_place(written, tmp_path):
-    path = written(('suite = "paper-15", count = 2', 'map = "gone.map", count = 2'))
-    with pytest.raises(InputError, match=r"held_out\.suites\.0: .*gone.map: no such file"):
+@pytest.mark.parametrize(("suite", "told"), [('map = "gone.map"', r"held_out\.suites\.0: .*gone.map: no such file"),
+                                             ('suite = "paper-99"', r"held_out\.suites\.0\.suite: 'paper-99'; ")])
+def test_a_suite_that_cannot_be_had_is_named_by_its_place(written, tmp_path, suite, told):
+    path = written(('suite = "paper-15", count = 2', f"{suite}, count = 2"))
+    with pytest.raises(InputError, match=told):
         set_up(load_job(path), path, tmp_path, quiet=True)

@@ -9,7 +9,7 @@ from tuning.methods.method import Method
 
 METHODS = ("sweep", "sobol", "nsga3", "cmaes", "gradient")
 CUT_ANYWHERE = ("sobol", "nsga3", "cmaes")
-"""Those that lose nothing if they are ended after any generation: a race may leave budget for more candidates."""
+"""Those that lose nothing if they are ended anywhere: a race may leave budget for more candidates."""
 
 
 def method_named(name: str) -> Method:

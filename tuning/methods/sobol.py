@@ -19,7 +19,7 @@ class Settings(BaseModel):
     @classmethod
     def _power_of_two(cls, value: int) -> int:
         if value & (value - 1):
-            raise ValueError("must be a power of two, such as 64")
+            raise ValueError(f"{value}; must be a power of two; try 64")
         return value
 
 
