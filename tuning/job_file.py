@@ -23,6 +23,17 @@ from tuning.store import FIGURES
 from tuning.suite_files import LARGEST_SEED
 
 MOST_EPISODES = 10**9
+OF_TYPE = {  # pydantic's kind of a mistake -> rule, remedy
+    "model_type": ("a table", "write its keys in { }, or beneath a line with its name in [ ]"),
+    "dict_type": ("a table", "write its keys in { }, or beneath a line with its name in [ ]"),
+    "list_type": ("a list", "write it in [ ], or each entry beneath a line with its name in [[ ]]"),
+    "string_type": ("text", "write it in quotes"),
+    "string_too_short": ("text of one character at least", "name it"),
+    "int_type": ("a whole number", "write it without quotes or decimals"),
+    "float_type": ("a number", "write it without quotes"),
+    "bool_type": ("true or false", "write one of them, without quotes"),
+    "too_short": ("one entry at least", "add one"),
+}
 ON_MAP = ("unknown", "resolution", "unknown_obstacles", "movers")  # what only a suite on one's own map is made with
 Share = Annotated[float, Field(gt=0.0, le=1.0)]
 Seed = Annotated[int, Field(ge=0, le=LARGEST_SEED)]
@@ -176,7 +187,7 @@ def load_job(path: Path, folder: Path | None = None) -> Job:
     """The job in a file. folder: that its paths are relative to, if not its own. InputError lists all mistakes."""
     from tuning.job_checks import mistakes_of  # builds on this module
 
-    content = read_toml(path, "a job, which is a TOML file,", "mend the line")
+    content = read_toml(path, "a job file (TOML)", "mend the line")
     try:
         job, wrong, mistakes = Job.model_validate(content), set(), []
     except ValidationError as error:
@@ -240,9 +251,8 @@ def _sentence(found: Mapping[str, Any], place: tuple[str, ...], known: tuple[str
         return f"{where}: unknown key; the keys are {', '.join(names)}; {nearest(str(found['loc'][-1]), names)}"
     if kind == "value_error":  # ours
         return placed(where, found["ctx"]["error"])
-    rule = found["msg"].removeprefix("Input should be ").removeprefix("Value error, ")
-    rule = rule if rule.startswith("must") else f"must be {rule[:1].lower()}{rule[1:]}"
-    return f"{where}: {value}; {rule}; correct it"
+    rule, remedy = OF_TYPE.get(kind, (found["msg"].removeprefix("Input should be "), "correct it"))
+    return f"{where}: {value}; must be {rule[:1].lower()}{rule[1:]}; {remedy}"
 
 
 def _names_at(place: tuple[str | int, ...]) -> tuple[str, ...]:

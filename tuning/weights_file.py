@@ -109,7 +109,7 @@ def parse_weight_rule(text: str) -> WeightRule:
 
 
 def _numbers(path: Path) -> dict[str, float]:
-    read = read_toml(path, "a TOML file of weights", "write lines such as: clearance = 0.4")
+    read = read_toml(path, "a file of weights (TOML)", "write lines such as: clearance = 0.4")
     return {key: _number(path, key, value) for key, value in read.items()}
 
 
