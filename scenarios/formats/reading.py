@@ -65,7 +65,7 @@ def read_lines(path: str | Path, kind: str) -> list[str]:
 def read_toml(path: str | Path, kind: str, remedy: str) -> dict[str, Any]:
     """The tables of a TOML file. Raises InputError as `read_lines` does, and with the line for what is not TOML."""
     try:
-        return tomllib.loads("\n".join(read_lines(path, kind)))
+        return tomllib.loads("".join(f"{line}\n" for line in read_lines(path, kind)))
     except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise bad_input(path, f"not TOML ({error})", f"{kind} is expected", remedy) from None
 
