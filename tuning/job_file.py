@@ -219,7 +219,7 @@ def _without(content: Mapping[str, Any], places: Iterable[tuple[int | str, ...]]
     parameters = content.get("parameters")
     parameters = parameters if isinstance(parameters, dict) else {}
     kept = {**content, "parameters": {name: table for name, table in parameters.items() if name not in names}}
-    tables = {name: TypeAdapter(field.annotation).validate_python(kept[name])
+    tables = {name: TypeAdapter(field.annotation).validate_python(kept[name])  # pyright: ignore[reportArgumentType]
               for name, field in Job.model_fields.items() if name in kept and name not in wrong}  # fmt: skip
     return Job.model_construct(**tables), wrong
 

@@ -68,4 +68,4 @@ def _plan(scenarios: Sequence[Scenario], candidates: Sequence[Constants], progra
 
 def _figures(planned: Planned) -> dict[str, np.ndarray]:
     found = planned.plan.search.status == Status.FOUND
-    return planned.figures | {"outcome": np.int32(Outcome.REACHED if found else Outcome.NO_PATH)}
+    return planned.figures | {"outcome": np.array(Outcome.REACHED if found else Outcome.NO_PATH, np.int32)}

@@ -64,9 +64,10 @@ def read_lines(path: str | Path, kind: str) -> list[str]:
 
 def read_toml(path: str | Path, kind: str, remedy: str) -> dict[str, Any]:
     """The tables of a TOML file. Raises InputError as `read_lines` does, and with the line for what is not TOML."""
+    text = "".join(f"{line}\n" for line in read_lines(path, kind))
     try:
-        return tomllib.loads("".join(f"{line}\n" for line in read_lines(path, kind)))
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        return tomllib.loads(text)
+    except (ValueError, RecursionError) as error:  # of a number too long, the former
         raise bad_input(path, f"not TOML ({error})", f"{kind} is expected", remedy) from None
 
 

@@ -550,7 +550,7 @@ MISTAKES = {
     "no suite to ablate": (("ablate",), "--suite, --suite-file, --map", "0 given", "give one"),
     "no room on the map": (("evaluate", "--map", "one.png"), "one.png", "no two connected cells", "a smaller radius"),
     # weights
-    "no such weights": ((*EVALUATE, "--weights", "gone.toml"), "gone.toml", "No such file", "name an existing one"),
+    "no such weights": ((*EVALUATE, "--weights", "gone.toml"), "gone.toml", "no such file", "check the name"),
     "unknown key": ((*EVALUATE, "--weights", "unknown.toml"), "unknown.toml", "clearence", "remove or rename"),
     "missing key": ((*EVALUATE, "--weights", "missing.toml"), "missing.toml", "velocity", "add it"),
     "NaN weight": ((*EVALUATE, "--weights", "nan.toml"), "nan.toml", "clearance = nan", "correct it"),

@@ -102,7 +102,7 @@ def test_a_rule_that_breaks_its_promise_only_when_rounded_to_float32_is_refused(
     assert "must be < 1" in message
 
 
-@pytest.mark.parametrize("content", [b"clearance 0.4", b"\x89PNG\r\n", b"clearance = 0.4\nclearance = 0.5\n",
+@pytest.mark.parametrize("content", [b"clearance 0.4", b"clearance = 0.4\nclearance = 0.5\n",
                                      b"a = " + b"1" * 5000, b"a = " + b"[" * 100_000])  # fmt: skip
 def test_what_is_not_toml_is_refused(tmp_path, content):
     path = tmp_path / "weights.toml"
@@ -187,9 +187,11 @@ def test_a_file_without_a_rule_has_none_to_read(written):
         load_weight_rule(written(**SCORE))
 
 
-def test_a_file_that_is_not_there_and_a_folder_are_refused(tmp_path):
-    assert "No such file" in refusal(tmp_path / "none.toml")
-    assert "Is a directory" in refusal(tmp_path)
+def test_a_file_that_is_not_there_a_folder_and_a_picture_are_refused(tmp_path):
+    assert "no such file" in refusal(tmp_path / "none.toml")
+    assert "is a folder" in refusal(tmp_path)
+    (tmp_path / "picture.toml").write_bytes(b"\x89PNG\r\n")
+    assert "byte 0 is not text" in refusal(tmp_path / "picture.toml")
 
 
 def test_a_rule_on_the_command_line():
