@@ -212,7 +212,7 @@ def placed(place: str, mistake: object) -> str:
     return f"{place}.{key}: {rest}" if key.isidentifier() else f"{place}: {text}"
 
 
-def _without(content: Mapping[str, Any], places: Iterable[tuple[int | str, ...]]) -> tuple[Job, set[int | str]]:
+def _without(content: Mapping[str, Any], places: Collection[tuple[int | str, ...]]) -> tuple[Job, set[int | str]]:
     """The job without the tables, and without the single parameters, in which there are mistakes; and those tables."""
     wrong = {place[0] for place in places if place[0] != "parameters"}
     names = {place[1] for place in places if place[0] == "parameters" and len(place) > 1}
