@@ -89,7 +89,6 @@ MISTAKES = {
                       "held_out: missing; .*; add it"),
     "wrong type": (("episodes = 30", 'episodes = "30"'),
                    "method.episodes: '30'; must be a whole number; write it without quotes or decimals"),
-    "no table": (('[method]\nname = "sobol"\nepisodes = 30', ""), "method: missing; .*"),
     "no list": (("[{suite = \"paper-15\", count = 3, seed = 1}]", '"paper-15"'),
                 "training.suites: 'paper-15'; must be a list; write it in .*"),
     "value for a table": (('[planner]\npreset = "extended"', 'planner = "extended"'),

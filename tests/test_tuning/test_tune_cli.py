@@ -23,7 +23,7 @@ def test_the_status_is_how_far_the_best_and_the_time_left():
 
 
 @pytest.mark.parametrize("event", [{"event": "generation"}, {"event": "generation", "best": BEST}, {"event": "block"},
-                                   {"event": "block", "episodes": "?", "seconds": 1.0}, {"event": None}])
+                                   {"event": "block", "episodes": "?", "seconds": 1.0}])
 def test_a_line_of_the_log_without_its_facts_tells_nothing(event):
     events = [BLOCK, GENERATION]
     assert status_lines("office", 1000, [*events, event], None) == status_lines("office", 1000, events, None)
