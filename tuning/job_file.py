@@ -3,7 +3,6 @@
 Paths in it are relative to its folder. Every mistake is told, a line each: file: dotted path: value; rule; remedy.
 """
 
-import tomllib
 from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
 from pathlib import Path
@@ -13,12 +12,13 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from adwa_jax.presets import PRESETS, ROBOTS
 from scenarios.errors import InputError
-from scenarios.formats.reading import bad_input, shown
+from scenarios.formats.reading import shown
 from tuning.choice import ChoiceSettings
 from tuning.methods import METHODS, settings_of
-from tuning.options import FARTHEST, FASTEST
+from tuning.robot_file import FARTHEST, FASTEST, SUFFIX
 from tuning.sources import MOST_OBSTACLES, Source
 from tuning.suite_files import LARGEST_SEED
+from tuning.toml_file import read_toml
 
 MOST_EPISODES = 10**9
 Share = Annotated[float, Field(gt=0.0, le=1.0)]
@@ -36,7 +36,7 @@ class PlannerTable(Table):
     """The planner whose constants are tuned; what is not tuned stays as it is here."""
 
     preset: str = "extended"
-    robot: str | None = None
+    robot: Name | None = None  # one of ROBOTS, or a .toml file of limits
     v_max: float | None = Field(default=None, gt=0.0, le=FASTEST)  # [m/s]
     sensor_range: float | None = Field(default=None, gt=0.0, le=FARTHEST)  # [m]
     weights: Name | None = None  # a file of constants to start from
@@ -148,7 +148,7 @@ def load_job(path: Path, folder: Path | None = None) -> Job:
     """The job in a file. folder: that its paths are relative to, if not its own. InputError lists all mistakes."""
     from tuning.job_checks import mistakes_of  # builds on this module
 
-    content = _read(path)
+    content: dict[str, Any] = read_toml(path, "a job is a TOML file", "mend the line")
     mistakes = _unknown_names(content)
     try:
         job = Job.model_validate(content)
@@ -165,23 +165,14 @@ def refused(path: Path, mistakes: Iterable[str]) -> InputError:
     return InputError("\n".join(f"{path}: {' '.join(mistake.split())}" for mistake in mistakes))
 
 
-def _read(path: Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise bad_input(path, f"cannot be read ({error.strerror})", "a job is a TOML file",
-                        "name an existing one") from None
-    except (ValueError, RecursionError) as error:
-        raise bad_input(path, f"not TOML ({error})", "a job is a TOML file", "mend the line") from None
-
-
 def _unknown_names(content: Mapping[str, Any]) -> list[str]:
     """Mistakes in names from lists that other modules keep, and in the method's own settings."""
     choices = {("planner", "preset"): PRESETS, ("planner", "robot"): ROBOTS, ("method", "name"): METHODS}
     found = []
     for (table, key), names in choices.items():
         value = content[table].get(key) if isinstance(content.get(table), dict) else None
-        if isinstance(value, str) and value not in names:
+        is_file = key == "robot" and isinstance(value, str) and value.endswith(SUFFIX)
+        if isinstance(value, str) and value not in names and not is_file:
             found.append(f"{table}.{key}: {shown(value)}; must be one of {', '.join(names)}; "
                          f"{_remedy(value, names, 'choose one of them')}")  # fmt: skip
     return found + _wrong_settings(content.get("method"))

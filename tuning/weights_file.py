@@ -17,7 +17,6 @@
 A key that the preset's rules leave without effect is refused.
 """
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import fields, replace
 from pathlib import Path
@@ -33,6 +32,7 @@ from adwa_jax.rules import Rules
 from adwa_jax.score import ScoreWeights
 from scenarios.errors import InputError
 from scenarios.formats.reading import bad_input, shown
+from tuning.toml_file import read_toml
 
 SCORE = tuple(field.name for field in fields(ScoreWeights))
 RULE = tuple(field.name for field in fields(WeightRule))
@@ -49,6 +49,7 @@ NEEDS = {
     "mover_cap": "mover_terms", "lookahead": "carrot", "route_margin": "replan",
 }  # fmt: skip
 LARGEST = 1e6  # beyond it sums of weighted terms may leave float32
+UNITS = {name: "m/s" if name == "mover_growth" else "m" for name in BEHAVIOUR}  # of the constants; the others have none
 Kind = TypeVar("Kind", ScoreWeights, WeightRule, Behaviour)
 
 
@@ -109,19 +110,9 @@ def parse_weight_rule(text: str) -> WeightRule:
     return _made("--weight-rule", WeightRule, dict(zip(RULE, numbers, strict=False)))
 
 
-def _read(path: Path) -> dict[str, object]:
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise bad_input(path, f"cannot be read ({error.strerror})", "weights are a TOML file",
-                        "name an existing one") from None
-    except (ValueError, RecursionError) as error:
-        raise bad_input(path, f"not TOML ({error})", "weights are a TOML file",
-                        "write lines such as: clearance = 0.4") from None
-
-
 def _numbers(path: Path) -> dict[str, float]:
-    return {key: _number(path, key, value) for key, value in _read(path).items()}
+    content = read_toml(path, "weights are a TOML file", "write lines such as: clearance = 0.4")
+    return {key: _number(path, key, value) for key, value in content.items()}
 
 
 def _number(path: Path, key: str, value: object) -> float:

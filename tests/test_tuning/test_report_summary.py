@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 
 from tests.test_tuning.findings_by_hand import evaluations, findings, job
+from tuning.analysis import chosen_by_hand
 from tuning.findings import Comparison, Interval
 from tuning.objectives import Statistic
 from tuning.report_summary import (
     SUCCESS,
+    choices_table,
     constants_table,
     honest_reading,
     objectives_table,
@@ -55,6 +57,16 @@ def test_the_verdict_looks_at_success_even_where_it_is_no_objective():
     found = replace(found, goals=goals, compared=Comparison(LESS, (SAME, SAME, SAME), False, ""))
     assert verdict(found).startswith("No:")
     assert "worse in success rate" in verdict(found)
+
+
+def test_tables_call_a_member_chosen_by_hand_chosen():
+    found = chosen_by_hand(findings(), 1, None, np.array([]), 0)
+    for table in (success_table(found), constants_table(found), objectives_table(found)):
+        assert "chosen" in table
+        assert "recommended" not in table
+    assert "0.4" in constants_table(found)  # clearance of row 5
+    assert "by hand (chosen)" in choices_table(found)
+    assert "nan" not in choices_table(found) + honest_reading(found)
 
 
 def test_where_the_default_is_recommended_it_is_said():
