@@ -173,12 +173,13 @@ def shown(statistic: Statistic, interval: Interval) -> str:
 
 
 def shown_difference(statistic: Statistic, interval: Interval) -> str:
-    """With signs; of rates in percentage points."""
+    """With signs and the unit; of rates in percentage points, of which nothing is said."""
     value, low, high = (float(part) for part in in_units(statistic, interval))
     if not np.isfinite(value):
         return NONE
     digits = _decimals(statistic, max(abs(low), abs(high)))
-    return f"{value:+.{digits}f} [{low:+.{digits}f},\N{NO-BREAK SPACE}{high:+.{digits}f}]"
+    unit = "" if statistic.measure in RATES else unit_of(statistic)
+    return f"{value:+.{digits}f}{f' {unit}' * bool(unit)} [{low:+.{digits}f},\N{NO-BREAK SPACE}{high:+.{digits}f}]"
 
 
 def _stable(choice: Choice) -> str:

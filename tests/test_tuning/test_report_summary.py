@@ -102,6 +102,7 @@ def test_values_carry_their_unit_and_interval():
     assert shown(TIME, Interval(30.25, 29.0, 31.5)) == f"30.2 s [29.0,{space}31.5]"
     assert shown(TIME, Interval(np.nan, np.nan, np.nan)) == "–"
     assert shown_difference(SUCCESS, Interval(-0.01, -0.05, 0.0)) == f"-1.0 [-5.0,{space}+0.0]"
+    assert shown_difference(TIME, Interval(0.5, 0.25, 0.75)) == f"+0.500 s [+0.250,{space}+0.750]"
 
 
 def test_tables_hold_both_suites_and_both_sets_of_constants():
