@@ -325,14 +325,17 @@ def _draw_members(findings: Findings, across: int, up: int, ax: "Axes") -> None:
 
 
 def _number_members(findings: Findings, across: int, up: int, ax: "Axes") -> None:
-    """Members at one place share a label."""
+    """Members at one place share a label; a white rim keeps it apart from what lies under it."""
+    from matplotlib.patheffects import withStroke
+
     statistics = findings.goals.objectives[across], findings.goals.objectives[up]
     numbers: dict[tuple[float, float], list[str]] = {}
     for number, member in enumerate(findings.front, start=1):
         x, y = _point(member.training, across, up, statistics).tolist()
         numbers.setdefault((x, y), []).append(str(number))
     for place, there in numbers.items():
-        ax.annotate(", ".join(there), place, xytext=(4, 4), textcoords="offset points", fontsize=FONT - 2, zorder=6)
+        ax.annotate(", ".join(there), place, xytext=(5, 5), textcoords="offset points", fontsize=FONT - 1, zorder=6,
+                    path_effects=[withStroke(linewidth=2.0, foreground="white")])  # fmt: skip
 
 
 def _draw_held_out(trained: np.ndarray, held_out: np.ndarray, color: str, kind: str, ax: "Axes") -> None:
