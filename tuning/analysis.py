@@ -6,7 +6,7 @@ Dimension letters: W candidates; N members; H rows driven on held-out scenarios;
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from tuning.bootstrap import (
 from tuning.choice import RULES, ChoiceSettings, Rule, Standing, pick, reason
 from tuning.comparison import compare
 from tuning.evaluations import Evaluations
-from tuning.findings import Choice, Comparison, Findings, Interval, Judgement, Member
+from tuning.findings import BY_HAND, Choice, Comparison, Findings, Interval, Judgement, Member
 from tuning.front import chances, front, thinned
 from tuning.hypervolume import hypervolume_curve
 from tuning.importance import importance
@@ -86,6 +86,19 @@ def optimism(member: Member, goals: Goals) -> tuple[float, ...] | None:
         return None
     pairs = zip(goals.objectives, member.training.objectives, member.held_out.objectives, strict=True)
     return tuple(statistic.sign * (there.value - here.value) for statistic, here, there in pairs)
+
+
+def chosen_by_hand(findings: Findings, member: int, held_out: Evaluations | None, held_out_rows: np.ndarray,
+                   seed: int) -> Findings:
+    """The findings with another member in the place of the recommended one, compared with the default as that was.
+
+    member: index into the front. held_out, held_out_rows, seed: those of `analyse`.
+    """
+    by_hand = Choice(BY_HAND, member, np.full(len(findings.front), np.nan), "Picked by hand.")
+    held_out_of = {row: index for index, row in enumerate(np.asarray(held_out_rows).tolist())}
+    compared = _compared(held_out, held_out_of, list(findings.front), member, findings.goals, seed)
+    return replace(findings, choices=(*findings.choices, by_hand), recommended=len(findings.choices),
+                   compared=compared)  # fmt: skip
 
 
 def judgements(evaluations: Evaluations, rows: Sequence[int], goals: Goals, seed: int) -> list[Judgement]:
@@ -169,11 +182,17 @@ def _choices(candidates: _Candidates, shown: list[int], repeats: ResampledScores
         Choice(
             rule=rule,
             member=shown.index(int(members[index])),
-            stability=float(np.mean([pick(rule, one, choice, goals) == index for one in again])),
+            shares=_shares([pick(rule, one, choice, goals) for one in again], members, shown),
             reason=reason(rule, standing, index, choice, goals),
         )
         for rule, index in _picked(candidates, choice, goals).items()
     )
+
+
+def _shares(picked: list[int], members: np.ndarray, shown: list[int]) -> np.ndarray:
+    """[N] of each member shown. picked: of each resample, an index into `members`, the whole front."""
+    counts = np.bincount(picked, minlength=len(members))
+    return counts[np.searchsorted(members, shown)] / len(picked)
 
 
 def _compared(held_out: Evaluations | None, held_out_of: dict[int, int], members: list[Member], recommended: int,

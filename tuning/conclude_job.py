@@ -7,11 +7,9 @@ from typing import Any
 import numpy as np
 
 from adwa_jax.presets import Preset
-from scenarios.errors import InputError
-from tuning.analysis import analyse, chosen_rows, front_rows
 from tuning.console import progress_bar
-from tuning.evaluations import Evaluations
 from tuning.findings import Findings, Member
+from tuning.finished_job import FinishedJob, finished, held_out_rows
 from tuning.job_checks import Setup
 from tuning.job_folder import HELD_OUT, TRAINING, Log, remembered
 from tuning.nav2 import nav2_text
@@ -20,7 +18,6 @@ from tuning.store import Store, as_evaluations
 from tuning.tiled_judge import TiledJudge
 from tuning.weights_file import weights_text
 
-SHOWN = 32  # members of the front that are driven on held-out scenarios
 RECOMMENDED, NAV2, PICTURES = "recommended.toml", "recommended_nav2.yaml", "failures"
 
 
@@ -28,17 +25,13 @@ def conclude(folder: Path, setup: Setup, environment: dict[str, Any]) -> Finding
     """Analyse what the stores hold; write the recommended constants and the report. Nothing is judged anew."""
     from tuning.report import write_report  # brings the drawing with it
 
-    job, training = setup.job, as_evaluations(folder / TRAINING)
-    if not training.done.any() or not training.complete[0]:
-        raise InputError(f"{folder}: the default constants are not judged yet; a report compares with them; go on: "
-                         f"adwa tune resume {folder}")  # fmt: skip
-    held_out, rows = _held_out(folder, training, setup)
-    findings = analyse(training, held_out, rows, setup.goals, setup.space, job.choice, job.seed)
+    done = finished(folder, setup)
+    findings = done.findings
     preset = setup.space.preset(_recommended(findings).values)
     write_whole(folder / RECOMMENDED, recommended_text(setup, findings, preset))
     write_whole(folder / NAV2, nav2_text(preset))
-    gallery = _gallery(folder, setup, preset, held_out, rows, findings)
-    write_report(folder, job, findings, training, held_out, rows, remembered(folder), environment, gallery)
+    write_report(folder, setup.job, findings, done.training, done.held_out, done.held_out_rows, remembered(folder),
+                 environment, _gallery(folder, done))  # fmt: skip
     return findings
 
 
@@ -81,29 +74,13 @@ def _recommended(findings: Findings) -> Member:
     return findings.front[findings.choices[findings.recommended].member]
 
 
-def _gallery(folder: Path, setup: Setup, preset: Preset, held_out: Evaluations | None, rows: np.ndarray,
-             findings: Findings) -> tuple:
+def _gallery(folder: Path, done: FinishedJob) -> tuple:
     """Pictures of the recommended constants' worst held-out scenarios."""
-    from tuning.failures import failure_pictures, results_of
+    from tuning.failures import failure_pictures
 
-    if held_out is None or setup.plans_only:
+    setup, findings = done.setup, done.findings
+    if done.held_out is None or setup.plans_only:
         return ()
-    row = int(np.flatnonzero(rows == _recommended(findings).row)[0])
-    results = results_of(held_out, row, setup.held_out)
-    return failure_pictures(setup.held_out, preset, results, folder / PICTURES, y_down=setup.y_down)
-
-
-def held_out_rows(training: Evaluations, setup: Setup) -> np.ndarray:
-    """[H] training rows that the held-out suite is driven with, ascending: the default, the front, every choice."""
-    return np.unique(np.concatenate([[0], front_rows(training, setup.goals, SHOWN),
-                                     chosen_rows(training, setup.goals, setup.job.choice)]))  # fmt: skip
-
-
-def _held_out(folder: Path, training: Evaluations, setup: Setup) -> tuple[Evaluations | None, np.ndarray]:
-    """The held-out evaluations with their training rows; none unless they are those of the training's front."""
-    nothing = None, np.zeros(0, np.int64)
-    if not (folder / HELD_OUT).exists():
-        return nothing
-    found, rows = as_evaluations(folder / HELD_OUT), held_out_rows(training, setup)
-    same = found.complete.all() and np.array_equal(found.values, training.values[rows])
-    return (found, rows) if same else nothing
+    number = findings.choices[findings.recommended].member + 1
+    return failure_pictures(setup.held_out, done.preset(number), done.held_out_results(number), folder / PICTURES,
+                            y_down=setup.y_down)  # fmt: skip

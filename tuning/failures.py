@@ -1,12 +1,12 @@
 """The worst scenarios of one planner, each with a picture and a sentence that says why it failed."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from adwa_jax.presets import Preset
-from scenarios.drawing import FONT, legend_below, new_figure
+from scenarios.drawing import FONT, figure_legend, legend_below, map_size, new_figure
 from scenarios.suite import Suite
 from tuning.evaluations import Evaluations
 from tuning.figures import drive_figure, drive_sentence
@@ -17,6 +17,7 @@ from tuning.replay import Replay, replay
 from tuning.results import Results
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 
@@ -35,6 +36,27 @@ def failure_pictures(suite: Suite, preset: Preset, results: Results, folder: Pat
     there are fewer than `limit`, the longest detours among the successes follow.
     """
     return tuple(_pictured(suite, preset, results, index, folder, y_down) for index in worst(results)[:limit])
+
+
+def worst_figure(suite: Suite, preset: Preset, results: Results, limit: int = 3, y_down: bool = False) -> "Figure":
+    """Drive the worst scenarios again, as `failure_pictures`, and draw them side by side: of a failure the last
+    seconds, of a success the whole way.
+    """
+    shown = worst(results)[:limit]
+    driven = [replay(suite.scenarios[index], preset) for index in shown]
+    height = max(map_size(one.scenario.grid, 4.4, 0.6)[1] for one in driven)
+    figure = new_figure((4.4 * len(shown), height))
+    axes = figure.subplots(1, len(shown), squeeze=False)[0].tolist()
+    shaded = None
+    for ax, one, index in zip(axes, driven, shown, strict=True):
+        if results.reached[index]:
+            _whole_drive(one, suite.names[index], y_down, ax)
+        else:
+            shaded = _last_seconds(one, suite.names[index], y_down, ax) or shaded
+    figure_legend(figure, axes)
+    if shaded is not None:
+        _time_bar(shaded, axes, figure)
+    return figure
 
 
 def results_of(evaluations: Evaluations, row: int, suite: Suite) -> Results:
@@ -64,25 +86,34 @@ def _pictured(suite: Suite, preset: Preset, results: Results, index: int, folder
         path = save_figure(lambda: _whole_drive(driven, name, y_down), folder / f"scenario_{index}.png")
         return FailurePicture(path, caption)
     cause = cause_by_result(results, index) or (Cause.TURNED if turned_back(driven) else Cause.MOVING)
-    path = save_figure(lambda: _last_seconds(driven, name, y_down), folder / f"scenario_{index}.png")
+    path = save_figure(lambda: _last_seconds_alone(driven, name, y_down), folder / f"scenario_{index}.png")
     return FailurePicture(path, f"{name}: {cause.heading.lower()}. {cause.sentence}")
 
 
-def _whole_drive(driven: Replay, name: str, y_down: bool) -> "Figure":
-    return drive_figure(driven.scenario, driven.plan, driven.episode, driven.trace, title=name, y_down=y_down,
-                        robot=driven.robot)  # fmt: skip
+def _whole_drive(driven: Replay, name: str, y_down: bool, ax: "Axes | None" = None) -> "Figure":
+    return drive_figure(driven.scenario, driven.plan, driven.episode, driven.trace, title=name, ax=ax, y_down=y_down,
+                        legend=ax is None, robot=driven.robot)  # fmt: skip
 
 
-def _last_seconds(driven: Replay, name: str, y_down: bool) -> "Figure":
+def _last_seconds_alone(driven: Replay, name: str, y_down: bool) -> "Figure":
     figure = new_figure((5.0, 6.0))
     ax = figure.subplots()
-    title = f"{name}: {drive_sentence(driven.plan, driven.episode)}"
-    shaded = draw_last_seconds(driven, ax, SECONDS, title, y_down)
-    ax.set_xlabel("x [m]", fontsize=FONT)
-    ax.set_ylabel("y [m]", fontsize=FONT)
+    shaded = _last_seconds(driven, name, y_down, ax)
     legend_below(ax)
     if shaded is not None:
-        bar = figure.colorbar(shaded, ax=ax, shrink=0.6, pad=0.02)
-        bar.set_label("time before the end [s]", fontsize=FONT)
-        bar.ax.tick_params(labelsize=FONT - 1)
+        _time_bar(shaded, [ax], figure)
     return figure
+
+
+def _last_seconds(driven: Replay, name: str, y_down: bool, ax: "Axes") -> Any:
+    """Returns what the bar of time needs, or None."""
+    shaded = draw_last_seconds(driven, ax, SECONDS, f"{name}: {drive_sentence(driven.plan, driven.episode)}", y_down)
+    ax.set_xlabel("x [m]", fontsize=FONT)
+    ax.set_ylabel("y [m]", fontsize=FONT)
+    return shaded
+
+
+def _time_bar(shaded: Any, axes: list["Axes"], figure: "Figure") -> None:
+    bar = figure.colorbar(shaded, ax=axes, shrink=0.6, pad=0.02)
+    bar.set_label("time before the end [s]", fontsize=FONT)
+    bar.ax.tick_params(labelsize=FONT - 1)

@@ -1,6 +1,6 @@
 """What the analysis of a job finds, as data: what reports draw and commands print.
 
-Dimension letters: D parameters; O objectives; G generations; R resamples of the scenarios.
+Dimension letters: D parameters; O objectives; N members of the front; G generations; R resamples of the scenarios.
 """
 
 from dataclasses import dataclass
@@ -9,6 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from tuning.objectives import Goals
+
+BY_HAND = "by hand"  # the rule of a choice that a person made
 
 
 class Interval(NamedTuple):
@@ -44,10 +46,15 @@ class Member:
 class Choice:
     """One member, picked by a rule."""
 
-    rule: str  # of choice.RULES
+    rule: str  # of choice.RULES, or BY_HAND
     member: int  # index into the front
-    stability: float  # share of the resamples in which the same of the front's members is picked; low among near-equals
+    shares: np.ndarray  # [N] of the resamples in which each member of the front is picked; the rest goes to others
     reason: str  # one sentence for people
+
+    @property
+    def stability(self) -> float:
+        """Share of the resamples in which the same member is picked; low among near-equals. NaN: picked by hand."""
+        return float(self.shares[self.member])
 
 
 @dataclass(frozen=True)
@@ -66,12 +73,17 @@ class Findings:
     parameters: tuple[str, ...]  # D
     goals: Goals
     default: Member
-    front: tuple[Member, ...]  # best first objective first
+    front: tuple[Member, ...]  # N, best first objective first
     choices: tuple[Choice, ...]
     recommended: int  # index into `choices`
     hypervolume: HypervolumeCurve
     importance: np.ndarray  # [D, O] in [0, 1]: share of an objective's variation that a parameter explains by itself
     compared: "Comparison | None"  # the recommended member against the default, held out; None: not driven there
+
+    @property
+    def picked(self) -> str:
+        """What the recommended member is called: "chosen" where it was picked by hand."""
+        return "chosen" if self.choices[self.recommended].rule == BY_HAND else "recommended"
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ from tuning.job_file import ConstraintTable, Job, ObjectiveTable, SuiteTable, ne
 from tuning.objectives import DEFAULT_OBJECTIVES, Constraint, Goals, Statistic
 from tuning.options import Vehicle, configured, reach_of
 from tuning.plans_only import PLANNED
+from tuning.robot_file import SUFFIX
 from tuning.sources import read_suite
 from tuning.space import Parameter, Space, tunable
 from tuning.store import FIGURES, TILE_WIDTH
@@ -85,7 +86,8 @@ def planner_of(job: Job, folder: Path) -> Preset:
     """The planner with its constants as they are before tuning."""
     table = job.planner
     weights = None if table.weights is None else folder / table.weights
-    return configured(table.preset, Vehicle(table.robot, table.v_max, table.sensor_range), weights)
+    robot = str(folder / table.robot) if table.robot and table.robot.endswith(SUFFIX) else table.robot
+    return configured(table.preset, Vehicle(robot, table.v_max, table.sensor_range), weights)
 
 
 def space_of(job: Job, config: Preset) -> Space:

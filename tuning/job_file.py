@@ -17,7 +17,7 @@ from scenarios.formats.reading import read_toml, shown
 from tuning.choice import ChoiceSettings
 from tuning.methods import METHODS, settings_of
 from tuning.objectives import measures_of
-from tuning.options import FARTHEST, FASTEST
+from tuning.robot_file import FARTHEST, FASTEST, SUFFIX
 from tuning.sources import MOST_OBSTACLES, Source
 from tuning.store import FIGURES
 from tuning.suite_files import LARGEST_SEED
@@ -40,11 +40,11 @@ Seed = Annotated[int, Field(ge=0, le=LARGEST_SEED)]
 Name = Annotated[str, Field(min_length=1, max_length=1024, pattern=r"^[^\x00]*$")]  # of a suite or a file
 
 
-def one_of(names: Collection[str]) -> AfterValidator:
-    """Refuses every other name, with the nearest of them."""
+def one_of(names: Collection[str], suffix: str | None = None) -> AfterValidator:
+    """Refuses every other name, with the nearest of them; but for a file's with the suffix."""
 
     def checked(value: str) -> str:
-        if value not in names:
+        if value not in names and not (suffix and value.endswith(suffix)):
             raise ValueError(f"{shown(value)}; must be one of {', '.join(names)}; "
                              f"{nearest(value, names, 'choose one of them')}")  # fmt: skip
         return value
@@ -71,7 +71,7 @@ class PlannerTable(Table):
     """The planner whose constants are tuned; what is not tuned stays as it is here."""
 
     preset: Annotated[str, one_of(PRESETS)] = "extended"
-    robot: Annotated[str, one_of(ROBOTS)] | None = None
+    robot: Annotated[Name, one_of(ROBOTS, SUFFIX)] | None = None  # or a file of limits
     v_max: float | None = Field(default=None, gt=0.0, le=FASTEST)  # [m/s]
     sensor_range: float | None = Field(default=None, gt=0.0, le=FARTHEST)  # [m]
     weights: Name | None = None  # a file of constants to start from

@@ -12,11 +12,9 @@ from adwa_jax.presets import PRESETS, ROBOTS, Preset, on_robot
 from adwa_jax.window import RobotLimits
 from scenarios.errors import InputError
 from scenarios.suite import SUITE_NAMES
+from tuning.robot_file import FARTHEST, FASTEST, SUFFIX, load_robot
 from tuning.suite_files import KINDS
 from tuning.weights_file import load_weights
-
-FASTEST = 10.0  # [m/s]
-FARTHEST = 1e4  # [m]
 
 
 class UnknownPolicy(StrEnum):
@@ -35,7 +33,8 @@ SeedOption = Annotated[int, typer.Option(help="Seed of scenarios that are made."
 SensedOnlyOption = Annotated[bool, typer.Option("--sensed-only", help="The robot has no map, only its senses.")]
 PresetOption = Annotated[str, typer.Option(help=f"One of {', '.join(PRESETS)}.")]
 WeightsOption = Annotated[Path | None, typer.Option(help="TOML of constants that stand in for the preset's.")]
-RobotOption = Annotated[str | None, typer.Option(help=f"One of {', '.join(ROBOTS)}; default: the preset's.")]
+ROBOT_HELP = f"One of {', '.join(ROBOTS)}, or a TOML file of limits; default: the preset's."
+RobotOption = Annotated[str | None, typer.Option(help=ROBOT_HELP)]
 SpeedOption = Annotated[float | None, typer.Option("--v-max", help="The robot's top speed, in m/s.")]
 RangeOption = Annotated[float | None, typer.Option("--sensor-range", help="How far the robot senses, in metres.")]
 JsonOption = Annotated[Path | None, typer.Option("--json", help="Write the results as JSON to this file, or print: -")]
@@ -50,14 +49,15 @@ QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing 
 class Vehicle:
     """The options that say with which robot; None: as the preset has it."""
 
-    robot: str | None = None  # a name of ROBOTS
+    robot: str | None = None  # a name of ROBOTS, or a .toml file of limits
     v_max: float | None = None  # [m/s]
     sensor_range: float | None = None  # [m]
 
     def __post_init__(self):
         """Refuse what no robot can have."""
-        if self.robot is not None and self.robot not in ROBOTS:
-            raise InputError(f"--robot: {self.robot!r}; the robots are {', '.join(ROBOTS)}; choose one of them")
+        if self.robot is not None and self.robot not in ROBOTS and not self.robot.endswith(SUFFIX):
+            raise InputError(f"--robot: {self.robot!r}; the robots are {', '.join(ROBOTS)}; choose one of them, or a "
+                             f"{SUFFIX} file of limits")  # fmt: skip
         if self.v_max is not None and not 0.0 < self.v_max <= FASTEST:
             raise InputError(f"--v-max: {self.v_max:g}; must be above 0 and at most {FASTEST:g} m/s; correct it")
         if self.sensor_range is not None and not 0.0 < self.sensor_range <= FARTHEST:
@@ -74,7 +74,10 @@ class Vehicle:
         return config._replace(constants=replace(config.constants, behaviour=behaviour))
 
     def _limits(self, constants: Constants) -> RobotLimits:
-        limits = constants.robot if self.robot is None else ROBOTS[self.robot]()
+        if self.robot in ROBOTS:
+            limits = ROBOTS[self.robot]()
+        else:
+            limits = constants.robot if self.robot is None else load_robot(Path(self.robot), constants.robot)
         return limits if self.v_max is None else replace(limits, v_max=self.v_max)
 
 

@@ -1,8 +1,8 @@
-"""The pictures of a tuning job's report: front, parallel coordinates, sweeps, hypervolume, importance, optimism gap,
-gradient agreement.
+"""The pictures of a tuning job: front, parallel coordinates, sweeps, hypervolume, importance, stability of the choices,
+optimism gap, gradient agreement.
 
 Findings in, matplotlib figures out. Conventions: `scenarios.drawing`. Where a figure has one panel, `ax` may be given.
-Dimension letters: D parameters; O objectives; W candidates; G generations; S starts of the gradient method.
+Dimension letters: D parameters; O objectives; N members; W candidates; G generations; S starts of the gradient method.
 """
 
 from collections.abc import Mapping, Sequence
@@ -27,8 +27,9 @@ from scenarios.drawing import (
 from tuning.analysis import judgements
 from tuning.console import UNITS
 from tuning.evaluations import Evaluations
-from tuning.findings import Findings, HypervolumeCurve, Judgement, Member
+from tuning.findings import BY_HAND, Findings, HypervolumeCurve, Judgement, Member
 from tuning.objectives import RATES, Goals, Statistic, estimate
+from tuning.weights_file import UNITS as CONSTANT_UNITS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -44,7 +45,7 @@ CHOSEN = {"marker": "*", "markersize": 13, "color": VERMILLION, "markeredgecolor
 
 
 def recommended(findings: Findings) -> Member:
-    """The member that the job recommends."""
+    """The member that the job recommends, or that was chosen by hand in its place."""
     return findings.front[findings.choices[findings.recommended].member]
 
 
@@ -65,6 +66,11 @@ def name_and_unit(statistic: Statistic) -> str:
     return measure_name(statistic) + (f" [{unit}]" if unit else "")
 
 
+def constant_and_unit(name: str) -> str:
+    """A constant's name for axes."""
+    return name.replace("_", " ") + (f" [{CONSTANT_UNITS[name]}]" if name in CONSTANT_UNITS else "")
+
+
 def unit_of(statistic: Statistic) -> str:
     """Of `in_units`."""
     return "%" if statistic.measure in RATES else UNITS.get(statistic.measure, "")
@@ -75,9 +81,11 @@ def in_units(statistic: Statistic, value: Any) -> Any:
     return (100.0 if statistic.measure in RATES else 1.0) * np.asarray(value, np.float64) + 0.0
 
 
-def front_figure(findings: Findings, training: Evaluations | None = None) -> "Figure":
+def front_figure(findings: Findings, training: Evaluations | None = None, numbered: bool = False) -> "Figure":
     """Every pair of objectives: the front, the default constants and the recommended ones, a line from each to its
     value on the held-out suite; all candidates in grey if `training` is given. One objective: by candidate.
+
+    numbered: members of the front carry the numbers that tables give them, from 1.
     """
     objectives = findings.goals.objectives
     if len(objectives) == 1:
@@ -90,10 +98,30 @@ def front_figure(findings: Findings, training: Evaluations | None = None) -> "Fi
             ax.plot(cloud[:, across], cloud[:, up], linestyle="none", marker=".", markersize=4, color=GREY, zorder=1,
                     label="candidate")  # fmt: skip
         _draw_members(findings, across, up, ax)
+        if numbered:
+            _number_members(findings, across, up, ax)
         _label_axes(ax, axis_label(objectives[across]), axis_label(objectives[up]))
         _show_members(findings, across, up, ax)
     figure_legend(figure, panels)
     return figure
+
+
+def parallel_table(findings: Findings) -> tuple[list[str], np.ndarray]:
+    """Names of D constants and O objectives, and [N + 1, D + O] their values, in units as shown: of the front's
+    members, objectives on training, then of the default.
+    """
+    objectives = findings.goals.objectives
+    names = [*map(constant_and_unit, findings.parameters), *map(name_and_unit, objectives)]
+    rows = [[*member.values, *(float(in_units(statistic, part.value)) for statistic, part in
+                               zip(objectives, member.training.objectives, strict=True))]
+            for member in (*findings.front, findings.default)]  # fmt: skip
+    return names, np.array(rows)
+
+
+def telling_objective(findings: Findings) -> int:
+    """The first objective in which the members differ."""
+    objectives = parallel_table(findings)[1][:, len(findings.parameters) :]
+    return int(np.argmax(np.nanmax(objectives, axis=0) > np.nanmin(objectives, axis=0)))
 
 
 def parallel_figure(findings: Findings, ax: "Axes | None" = None) -> "Figure":
@@ -104,16 +132,12 @@ def parallel_figure(findings: Findings, ax: "Axes | None" = None) -> "Figure":
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 
-    objectives, members = findings.goals.objectives, [*findings.front, findings.default]
-    table = np.array([[*member.values, *(float(in_units(statistic, part.value)) for statistic, part in
-                                         zip(objectives, member.training.objectives, strict=True))]
-                      for member in members])  # fmt: skip
-    names = [*(name.replace("_", " ") for name in findings.parameters), *map(measure_name, objectives)]
+    names, table = parallel_table(findings)
     if ax is None:
         ax = new_figure((max(0.62 * len(names) + 1.6, 5.0), 4.6)).subplots()
     low, high = np.nanmin(table, axis=0), np.nanmax(table, axis=0)
     lines = np.where(high > low, (table - low) / np.where(high > low, high - low, 1.0), 0.5)
-    shade = int(np.argmax((high > low)[len(findings.parameters) :]))
+    shade = telling_objective(findings)
     shaded = table[:, len(findings.parameters) + shade]
     shades = ScalarMappable(Normalize(np.nanmin(shaded), np.nanmax(shaded)), COLOURS)
     for line, value in zip(lines[:-1], shaded[:-1], strict=True):
@@ -121,10 +145,10 @@ def parallel_figure(findings: Findings, ax: "Axes | None" = None) -> "Figure":
     ax.plot(lines[-1], color=BLACK, linewidth=1.8, linestyle="--", zorder=3, label="default constants")
     best = lines[findings.choices[findings.recommended].member]
     style: dict[str, Any] = CHOSEN | {"markersize": 9}
-    ax.plot(best, linewidth=2.4, zorder=4, label="recommended", **style)
+    ax.plot(best, linewidth=2.4, zorder=4, label=findings.picked, **style)
     _dress_parallel(ax, names, low, high, len(findings.parameters))
     bar = figure_of(ax).colorbar(shades, ax=ax, pad=0.01, shrink=0.8)
-    bar.set_label(axis_label(objectives[shade]), fontsize=FONT)
+    bar.set_label(axis_label(findings.goals.objectives[shade]), fontsize=FONT)
     bar.ax.tick_params(labelsize=FONT - 1)
     figure_legend(figure_of(ax), [ax])
     return figure_of(ax)
@@ -202,6 +226,36 @@ def importance_figure(findings: Findings, ax: "Axes | None" = None) -> "Figure":
     return figure_of(ax)
 
 
+def stability_figure(findings: Findings, ax: "Axes | None" = None) -> "Figure":
+    """Heat map over the front's members, had other scenarios of the kind been drawn: in how many [%] of the resamples
+    nothing dominates a member, and each rule picks it. The rules' picks are framed.
+
+    Members without a number in a row are picked in under half a percent; thinned fronts leave some out altogether.
+    """
+    from matplotlib.patches import Rectangle
+
+    choices = [choice for choice in findings.choices if choice.rule != BY_HAND]
+    share = 100.0 * np.array([[member.non_dominated for member in findings.front], *(one.shares for one in choices)])
+    if ax is None:
+        ax = new_figure((0.42 * share.shape[1] + 3.4, 0.42 * len(share) + 1.3)).subplots()
+    image = ax.imshow(share, cmap=COLOURS, vmin=0.0, vmax=100.0, aspect="auto")
+    for (row, column), value in np.ndenumerate(share):
+        ax.text(column, row, f"{value:.0f}" if value > 0.5 else "", ha="center", va="center", fontsize=FONT - 1,
+                color=BLACK if value > 55 else "white")  # fmt: skip
+    for row, choice in enumerate(choices, start=1):
+        ax.add_patch(Rectangle((choice.member - 0.5, row - 0.5), 1, 1, fill=False, edgecolor=VERMILLION, linewidth=2.5,
+                               zorder=3))  # fmt: skip
+    ax.set_xticks(range(share.shape[1]), [str(number) for number in range(1, share.shape[1] + 1)])
+    ax.set_yticks(range(len(share)), ["not dominated", *(one.rule.replace("_", " ") for one in choices)])
+    ax.axhline(0.5, color="white", linewidth=3.0)
+    ax.set_xlabel("member of the front", fontsize=FONT)
+    ax.tick_params(labelsize=FONT, length=0)
+    bar = figure_of(ax).colorbar(image, ax=ax, pad=0.02)
+    bar.set_label("share of the resamples [%]", fontsize=FONT)
+    bar.ax.tick_params(labelsize=FONT - 1)
+    return figure_of(ax)
+
+
 def optimism_figure(findings: Findings) -> "Figure":
     """Training against held-out, a panel an objective, with 95 % intervals: on the dashed line both are equal."""
     objectives = findings.goals.objectives
@@ -211,7 +265,7 @@ def optimism_figure(findings: Findings) -> "Figure":
         others = [member for member in findings.front if member is not best]
         _draw_against(others, index, statistic, ax, FRONT | {"label": "front"})
         _draw_against([findings.default], index, statistic, ax, DEFAULT | {"label": "default constants"})
-        _draw_against([best], index, statistic, ax, CHOSEN | {"label": "recommended"})
+        _draw_against([best], index, statistic, ax, CHOSEN | {"label": findings.picked})
         ends = np.array([*ax.get_xlim(), *ax.get_ylim()])
         ax.axline((ends.min(), ends.min()), slope=1.0, color=GREY, linestyle="--", linewidth=1.0, zorder=0)
         _label_axes(ax, f"training: {axis_label(statistic)}", f"held-out: {name_and_unit(statistic)}")
@@ -262,12 +316,26 @@ def _draw_members(findings: Findings, across: int, up: int, ax: "Axes") -> None:
     statistics = findings.goals.objectives[across], findings.goals.objectives[up]
     best = recommended(findings)
     for kind, members, style in (("front", findings.front, FRONT), ("default constants", [findings.default], DEFAULT),
-                                 ("recommended", [best], CHOSEN)):  # fmt: skip
+                                 (findings.picked, [best], CHOSEN)):  # fmt: skip
         points = np.array([_point(member.training, across, up, statistics) for member in members])
         ax.plot(*points.T, linestyle="none", zorder=4 if kind == "front" else 5, label=kind, **style)
         for member, point in zip(members, points, strict=True):
             if member.held_out is not None:
                 _draw_held_out(point, _point(member.held_out, across, up, statistics), style["color"], kind, ax)
+
+
+def _number_members(findings: Findings, across: int, up: int, ax: "Axes") -> None:
+    """Members at one place share a label; a white rim keeps it apart from what lies under it."""
+    from matplotlib.patheffects import withStroke
+
+    statistics = findings.goals.objectives[across], findings.goals.objectives[up]
+    numbers: dict[tuple[float, float], list[str]] = {}
+    for number, member in enumerate(findings.front, start=1):
+        x, y = _point(member.training, across, up, statistics).tolist()
+        numbers.setdefault((x, y), []).append(str(number))
+    for place, there in numbers.items():
+        ax.annotate(", ".join(there), place, xytext=(5, 5), textcoords="offset points", fontsize=FONT - 1, zorder=6,
+                    path_effects=[withStroke(linewidth=2.0, foreground="white")])  # fmt: skip
 
 
 def _draw_held_out(trained: np.ndarray, held_out: np.ndarray, color: str, kind: str, ax: "Axes") -> None:
@@ -304,7 +372,7 @@ def _single_objective(findings: Findings, training: Evaluations | None) -> "Figu
         ax.plot(np.flatnonzero(training.complete), cloud[:, 0], linestyle="none", marker=".", color=GREY,
                 label="candidate")  # fmt: skip
     for member, style, kind in ((findings.default, DEFAULT, "default constants"),
-                                (recommended(findings), CHOSEN, "recommended")):  # fmt: skip
+                                (recommended(findings), CHOSEN, findings.picked)):  # fmt: skip
         value = float(in_units(statistic, member.training.objectives[0].value))
         ax.plot(member.row, value, linestyle="none", label=kind, **style)
         if member.held_out is not None:

@@ -1,6 +1,6 @@
-"""The front as a plot that answers to the mouse: its axes can be chosen, a point shows its constants.
+"""The front as plots that answer to the mouse: axes can be chosen and brushed, a point shows its constants.
 
-Needs plotly, the `report` extra; all of it is inlined, so that the page works offline.
+Needs plotly, the `report` extra; a report has all of it inlined, so that the page works offline.
 """
 
 import json
@@ -14,7 +14,21 @@ from scenarios.drawing import BLACK, BLUE, ORANGE, VERMILLION
 from tuning.evaluations import Evaluations
 from tuning.findings import Findings, Judgement, Member
 from tuning.objectives import Goals
-from tuning.report_figures import GREY, axis_label, candidate_objectives, in_units, measure_name, recommended, unit_of
+from tuning.report_figures import (
+    COLOURS,
+    GREY,
+    axis_label,
+    candidate_objectives,
+    front_figure,
+    in_units,
+    measure_name,
+    name_and_unit,
+    parallel_figure,
+    parallel_table,
+    recommended,
+    telling_objective,
+    unit_of,
+)
 
 PLACE = "front-plot"  # id of the plot's element
 
@@ -32,6 +46,33 @@ def interactive_front(findings: Findings, training: Evaluations) -> tuple[str, s
     element = f'<div class="plot" id="{PLACE}" role="img" aria-label="Interactive scatter plot of the front"></div>'
     fill = f'{{ const figure = {figure}; Plotly.newPlot("{PLACE}", figure.data, figure.layout, {json.dumps(CONFIG)}) }}'
     return element, f"<script>{get_plotlyjs()}</script>\n<script>{fill}</script>"
+
+
+def explore_front(findings: Findings, training: Evaluations) -> Any:
+    """A plotly figure: choose its axes, point at a member for its number and constants. Without plotly `front_figure`
+    with the members' numbers.
+    """
+    return _figure(findings, training) if available() else front_figure(findings, training, numbered=True)
+
+
+def explore_parallel(findings: Findings) -> Any:
+    """Parallel coordinates as a plotly figure, in which a range of an axis can be brushed; the first axis is the
+    member's number, 0 the default. Without plotly `parallel_figure`.
+    """
+    if not available():
+        return parallel_figure(findings)
+    import plotly.graph_objects as go
+
+    names, table = parallel_table(findings)
+    numbers = [*range(1, len(findings.front) + 1), 0]
+    shade = telling_objective(findings)
+    lines = {"color": table[:, len(findings.parameters) + shade], "colorscale": COLOURS, "showscale": True,
+             "colorbar": {"title": {"text": name_and_unit(findings.goals.objectives[shade]), "side": "right"}}}
+    axes = [{"label": "member", "values": numbers, "tickvals": sorted(numbers)},
+            *({"label": name, "values": table[:, index]} for index, name in enumerate(names))]  # fmt: skip
+    figure = go.Figure(go.Parcoords(line=lines, dimensions=axes, labelangle=-20))
+    figure.update_layout(template="plotly_white", height=460, margin={"l": 60, "r": 20, "t": 110, "b": 30})
+    return figure
 
 
 CONFIG = {"displaylogo": False, "responsive": True, "modeBarButtonsToRemove": ["lasso2d", "select2d"]}
@@ -65,7 +106,7 @@ def _traces(findings: Findings, training: Evaluations) -> list[tuple[str, np.nda
     for name, members, style in (
         ("front", others, {"color": BLUE, "size": 10, "symbol": "circle"}),
         ("default constants", [default], {"color": BLACK, "size": 11, "symbol": "square"}),
-        ("recommended", [best], {"color": VERMILLION, "size": 17, "symbol": "star"}),
+        (findings.picked, [best], {"color": VERMILLION, "size": 17, "symbol": "star"}),
     ):
         kinds.append((name, _points(goals, [member.training for member in members]),
                       [_member_text(findings, member) for member in members], style))  # fmt: skip
@@ -120,7 +161,13 @@ def _member_text(findings: Findings, member: Member) -> str:
         shown = [f"{float(in_units(statistic, judged.objectives[index].value)):.4g}{unit_of(statistic)} {suite}"
                  for suite, judged in parts if judged is not None]  # fmt: skip
         lines.append(f"{escape(measure_name(statistic))}: {', '.join(shown)}")
-    return "<br>".join(lines) + "<br>" + _constants(findings, member.values)
+    return "<br>".join([_number(findings, member), *lines, _constants(findings, member.values)])
+
+
+def _number(findings: Findings, member: Member) -> str:
+    """As the tables number them."""
+    rows = [one.row for one in findings.front]
+    return f"member {rows.index(member.row) + 1}" if member.row in rows else "member 0"
 
 
 def _constants(findings: Findings, values: np.ndarray) -> str:

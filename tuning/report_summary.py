@@ -8,7 +8,7 @@ import numpy as np
 from adwa_jax.episode import Outcome
 from tuning.evaluations import Evaluations
 from tuning.figures import SENTENCES
-from tuning.findings import Comparison, Findings, Interval, Judgement, Member
+from tuning.findings import Choice, Comparison, Findings, Interval, Judgement, Member
 from tuning.objectives import RATES, Statistic
 from tuning.report_figures import in_units, measure_name, name_and_unit, recommended, unit_of
 from tuning.report_html import table
@@ -50,7 +50,7 @@ def honest_reading(findings: Findings) -> str:
     best, choice = recommended(findings), findings.choices[findings.recommended]
     sentences = [
         f"The recommended constants were picked by the rule “{choice.rule}”: {choice.reason}",
-        f"Had other scenarios of the kind been drawn, the rule would have picked the same in {choice.stability:.0%} of "
+        f"Had other scenarios of the kind been drawn, the rule would have picked the same in {_stable(choice)} of "
         f"cases, and no candidate would have been better in everything in {best.non_dominated:.0%}.",
     ]
     if best.held_out is not None:
@@ -99,7 +99,7 @@ def success_table(findings: Findings) -> str:
         rows.append(("held out", str(best.held_out.scenarios), shown(SUCCESS, default.held_out.success),
                      shown(SUCCESS, best.held_out.success), change))  # fmt: skip
     return table("Success, with 95 % Wilson intervals; the change is paired, in percentage points",
-                 ("suite", "scenarios", "before: default", "after: recommended", "change"), rows)  # fmt: skip
+                 ("suite", "scenarios", "before: default", f"after: {findings.picked}", "change"), rows)  # fmt: skip
 
 
 def constants_table(findings: Findings) -> str:
@@ -107,7 +107,7 @@ def constants_table(findings: Findings) -> str:
     best = recommended(findings)
     rows = [(name, f"{before:.4g}", f"{after:.4g}") for name, before, after in
             zip(findings.parameters, findings.default.values, best.values, strict=True)]  # fmt: skip
-    return table("Constants (all others keep their defaults)", ("constant", "default", "recommended"), rows)
+    return table("Constants (all others keep their defaults)", ("constant", "default", findings.picked), rows)
 
 
 def objectives_table(findings: Findings) -> str:
@@ -125,8 +125,8 @@ def objectives_table(findings: Findings) -> str:
         better = "less" if statistic.direction == "min" else "more"
         rows.append((f"{measure_name(statistic)} ({better} is better)", *cells))
     return table("Objectives, with 95 % intervals, each by itself; the change is paired, on held-out scenarios",
-                 ("objective", "training: default", "training: recommended", "held out: default",
-                  "held out: recommended", "change", "reading"), rows)  # fmt: skip
+                 ("objective", "training: default", f"training: {findings.picked}", "held out: default",
+                  f"held out: {findings.picked}", "change", "reading"), rows)  # fmt: skip
 
 
 def choices_table(findings: Findings) -> str:
@@ -135,9 +135,9 @@ def choices_table(findings: Findings) -> str:
     for index, choice in enumerate(findings.choices):
         member = findings.front[choice.member]
         unseen = NONE if member.held_out is None else shown(SUCCESS, member.held_out.success)
-        mark = " (recommended)" if index == findings.recommended else ""
+        mark = f" ({findings.picked})" if index == findings.recommended else ""
         rows.append((f"{choice.rule.replace('_', ' ')}{mark}", f"{choice.member + 1}",
-                     shown(SUCCESS, member.training.success), unseen, f"{choice.stability:.0%}", choice.reason))
+                     shown(SUCCESS, member.training.success), unseen, _stable(choice), choice.reason))
     return table("What each rule of choice picks; stable: how often it picks the same when scenarios are resampled",
                  ("rule", "member", "success, training", "success, held out", "stable", "reason"), rows)  # fmt: skip
 
@@ -153,7 +153,7 @@ def front_table(findings: Findings) -> str:
 
 def outcomes_table(findings: Findings, held_out: Evaluations, held_out_rows: np.ndarray) -> str:
     """How the held-out scenarios ended, before and after."""
-    members = {"before: default": findings.default, "after: recommended": recommended(findings)}
+    members = {"before: default": findings.default, f"after: {findings.picked}": recommended(findings)}
     ended = [held_out.columns["outcome"][np.flatnonzero(held_out_rows == member.row)[0]] for member in members.values()
              if member.row in held_out_rows]  # fmt: skip
     if len(ended) < len(members):
@@ -173,12 +173,18 @@ def shown(statistic: Statistic, interval: Interval) -> str:
 
 
 def shown_difference(statistic: Statistic, interval: Interval) -> str:
-    """With signs; of rates in percentage points."""
+    """With signs and the unit; of rates in percentage points, of which nothing is said."""
     value, low, high = (float(part) for part in in_units(statistic, interval))
     if not np.isfinite(value):
         return NONE
     digits = _decimals(statistic, max(abs(low), abs(high)))
-    return f"{value:+.{digits}f} [{low:+.{digits}f},\N{NO-BREAK SPACE}{high:+.{digits}f}]"
+    unit = "" if statistic.measure in RATES else unit_of(statistic)
+    return f"{value:+.{digits}f}{f' {unit}' * bool(unit)} [{low:+.{digits}f},\N{NO-BREAK SPACE}{high:+.{digits}f}]"
+
+
+def _stable(choice: Choice) -> str:
+    """A share, unknown where no rule picked."""
+    return NONE if np.isnan(choice.stability) else f"{choice.stability:.0%}"
 
 
 def _decimals(statistic: Statistic, value: float) -> int:

@@ -11,6 +11,7 @@ from pathlib import Path
 from tuning.conclude_job import conclude, drive_held_out
 from tuning.console import note, progress_bar
 from tuning.findings import Findings
+from tuning.finished_job import FinishedJob, finished
 from tuning.job_checks import Setup, set_up
 from tuning.job_file import load_job
 from tuning.job_folder import (
@@ -67,6 +68,11 @@ def report_job(folder: Path, quiet: bool = False) -> Findings:
         if damaged:
             note(f"adwa: {damaged} damaged tiles are left out; to drive them anew: adwa tune resume {folder}")
         return findings
+
+
+def open_job(folder: str | Path) -> FinishedJob:
+    """The job in a folder, to be looked at; nothing is driven or written. InputError where there is none."""
+    return finished(Path(folder), _reread(Path(folder), quiet=True))
 
 
 def read_setup(file: Path, home: Path, quiet: bool = False) -> Setup:

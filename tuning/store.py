@@ -21,6 +21,7 @@ from adwa_jax.metrics import Measures, PlannedMeasures
 from scenarios.errors import InputError
 from tuning.console import UNITS
 from tuning.evaluations import Evaluations
+from tuning.weights_file import UNITS as CONSTANT_UNITS
 
 if TYPE_CHECKING:
     import xarray
@@ -118,7 +119,7 @@ class Store:
 
 def open_evaluations(folder: str | Path, suite: str = "training") -> "xarray.Dataset":
     """The evaluations of a job's folder, by name: a variable [candidate, scenario] for every figure, with its unit, and
-    `done`. Each candidate's constants and generation are coordinates.
+    `done`. Each candidate's constants, with their units, and generation are coordinates.
 
     What is not done, of candidates dropped early, is NaN; where all is done, whole figures are whole numbers. suite:
     "training" or "held_out".
@@ -131,7 +132,8 @@ def open_evaluations(folder: str | Path, suite: str = "training") -> "xarray.Dat
                                  for name, values in found.columns.items()}  # fmt: skip
     variables["outcome"][2].update(flag_values=[int(outcome) for outcome in Outcome],
                                    flag_meanings=" ".join(outcome.name for outcome in Outcome))  # fmt: skip
-    constants = {name: ("candidate", found.values[:, index]) for index, name in enumerate(found.parameters)}
+    constants = {name: ("candidate", found.values[:, index], {"units": CONSTANT_UNITS.get(name, "")})
+                 for index, name in enumerate(found.parameters)}  # fmt: skip
     coordinates = {"candidate": np.arange(len(found.values)), "scenario": list(names),
                    "generation": ("candidate", found.generation), **constants}  # fmt: skip
     return xarray.Dataset({**variables, "done": (dimensions, found.done)}, coordinates)

@@ -48,6 +48,7 @@ NEEDS = {
     "mover_cap": "mover_terms", "lookahead": "carrot", "route_margin": "replan",
 }  # fmt: skip
 LARGEST = 1e6  # beyond it sums of weighted terms may leave float32
+UNITS = {name: "m/s" if name == "mover_growth" else "m" for name in BEHAVIOUR}  # of the constants; the others have none
 Kind = TypeVar("Kind", ScoreWeights, WeightRule, Behaviour)
 
 

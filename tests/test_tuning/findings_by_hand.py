@@ -53,8 +53,9 @@ def findings(held_out=True):
                    Interval(-1.9, -2.4, -1.4))  # fmt: skip
     compared = Comparison(differences[0], differences, False, "No member of the front has fewer danger points and a "
                           "shorter way at once.") if held_out else None  # fmt: skip
-    choices = (Choice("knee", 0, 0.7, "Nearest to the best of every objective at once."),
-               Choice("constraint", 1, 0.35, "The best length_ratio of those with success 95.0% or more."))
+    picked = np.array([[0.7, 0.2, 0.1], [0.25, 0.35, 0.3]])
+    choices = (Choice("knee", 0, picked[0], "Nearest to the best of every objective at once."),
+               Choice("constraint", 1, picked[1], "The best length_ratio of those with success 95.0% or more."))
     importance = np.array([[0.5, 0.8, 0.1, 0.9], [0.1, 0.05, 0.2, 0.0], [0.2, 0.1, 0.05, 0.02]])
     curve = HypervolumeCurve(np.array([40, 160, 300]), np.array([0.1, 0.25, 0.4]), np.array([0.0, 1.2, 12.0, 8.0]))
     return Findings(PARAMETERS, GOALS, members[0], tuple(members[1:]), choices, 0, curve, importance, compared)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.test_tuning.handmade import SPACE, TWO_GOALS, evaluations, solved
-from tuning.analysis import analyse, chosen_rows, front_rows, judgements, optimism
+from tuning.analysis import analyse, chosen_by_hand, chosen_rows, front_rows, judgements, optimism
 from tuning.bootstrap import RESAMPLES
 from tuning.choice import RULES, ChoiceSettings
 from tuning.intervals import wilson
@@ -105,6 +105,34 @@ def test_stability_is_the_share_of_resamples_with_the_same_pick():
     error = np.sqrt(0.637 * 0.363 / RESAMPLES)
     assert by_rule["constraint"].stability == pytest.approx(1.0 - (39 / 40) ** 40, abs=4 * error)
     assert by_rule["weights"].stability == 1.0  # the shorter one is shorter in all of them
+
+
+def test_each_member_has_its_share_of_the_picks():
+    """The whole of them where all members are shown; the constraint picks one or the other of two."""
+    judged = evaluations(solved([39, 40], 40), [1.1, 1.2])
+    findings = analyse(judged, None, np.array([], np.int64), TWO_GOALS, SPACE, ChoiceSettings(at_least=1.0), 0)
+    for choice in findings.choices:
+        assert choice.shares.shape == (2,)
+        assert choice.shares.sum() == pytest.approx(1.0)
+        assert choice.stability == choice.shares[choice.member]
+    constraint = findings.choices[RULES.index("constraint")]
+    most = next(index for index, member in enumerate(findings.front) if member.row == 1)
+    assert constraint.member == most
+    assert constraint.shares[1 - most] == pytest.approx((39 / 40) ** 40, abs=0.07)
+
+
+def test_a_member_chosen_by_hand_is_compared_in_the_place_of_the_recommended():
+    rows = (3, 0, 2)
+    before = found(on_held_out(), rows=rows)
+    for member, gained in ((0, 7 / 40), (1, 1 / 40)):  # training rows 2 and 3, held out 36 and 30 against 29 of 40
+        after = chosen_by_hand(before, member, on_held_out(), np.array(rows), 0)
+        assert after.picked == "chosen"
+        assert after.choices[after.recommended].member == member
+        assert np.isnan(after.choices[after.recommended].stability)
+        assert after.compared.success.value == pytest.approx(gained)
+        assert after.choices[:-1] == before.choices
+    assert before.picked == "recommended"
+    assert chosen_by_hand(before, 0, None, np.array([]), 0).compared is None
 
 
 def test_held_out_figures_belong_to_their_training_rows():

@@ -5,7 +5,7 @@ from adwa_jax.episode import Outcome
 from adwa_jax.presets import paper
 from tests.test_tuning.worlds import mixed_suite, part_of
 from tuning.evaluations import Evaluations
-from tuning.failures import failure_pictures, results_of, worst
+from tuning.failures import failure_pictures, results_of, worst, worst_figure
 from tuning.results import Results
 
 HIT, STUCK, DONE = Outcome.HIT_MOVER, Outcome.STUCK, Outcome.REACHED
@@ -34,6 +34,18 @@ def test_worst_are_drawn_with_the_reason(tmp_path):
         assert picture.path.parent == tmp_path
         with Image.open(picture.path) as image:
             assert min(image.size) > 400
+
+
+def test_worst_are_drawn_side_by_side_with_axes_in_metres():
+    suite = part_of(mixed_suite(), [1, 3, 4])
+    found = Results("mixed", suite.names, np.array([DONE, Outcome.NO_PATH, Outcome.TIMEOUT], np.int32),
+                    {"length_ratio": np.array([1.25, 0.0, 0.0]), "hit_while_stopped": np.zeros(3)})  # fmt: skip
+    figure = worst_figure(suite, paper(), found, limit=3)
+    *panels, bar = figure.axes
+    assert [panel.get_title().split(":")[0] for panel in panels] == ["walled", "brief", "detour"]
+    assert {(panel.get_xlabel(), panel.get_ylabel()) for panel in panels} == {("x [m]", "y [m]")}
+    assert bar.get_ylabel() == "time before the end [s]"
+    assert len(worst_figure(suite, paper(), found, limit=1).axes) == 1  # it never drove: no time to show
 
 
 def test_a_candidates_row_is_read_as_an_evaluation():

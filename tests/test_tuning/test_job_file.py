@@ -1,6 +1,7 @@
 """Mistakes in job files: each named with its dotted path, all of them together, before anything runs."""
 
 import re
+from dataclasses import replace
 
 import pytest
 
@@ -81,6 +82,13 @@ def test_several_suites_are_taken_together_under_different_names(written, tmp_pa
     assert len(set(setup.training.names)) == len(setup.training.scenarios) == 5
 
 
+def test_a_robots_file_lies_relative_to_the_job(written, tmp_path):
+    (tmp_path / "small.toml").write_text("radius = 0.2\nv_max = 0.6\n")
+    path = written(('preset = "extended"', 'preset = "extended"\nrobot = "small.toml"'))
+    robot = planner_of(load_job(path), tmp_path).constants.robot
+    assert robot == replace(extended().constants.robot, radius=0.2, v_max=0.6)
+
+
 MISTAKES = {
     "unknown key": (("seed = 7", "sead = 7"), "sead: unknown key; the keys are name, seed, .*; did you mean seed?"),
     "unknown key of an entry": (("count = 3", "cuont = 3"),
@@ -111,6 +119,7 @@ MISTAKES = {
     "two kinds of suite": (('suite = "paper-15", count = 3', 'suite = "paper-15", map = "a.png", count = 3'),
                            "training.suites.0: suite, map given; exactly one .*; give one"),
     "no robot": (('preset = "extended"', 'preset = "extended"\nrobot = "tank"'), "planner.robot: 'tank'; .*"),
+    "no robot file": (('preset = "extended"', 'preset = "extended"\nrobot = "gone.toml"'), "planner: .*gone.toml: .*"),
     "no weights": (('preset = "extended"', 'preset = "extended"\nweights = "gone.toml"'), "planner: .*gone.toml: .*"),
     "race on few": (("episodes = 30", "episodes = 30\nracing = true"), "method.racing: true; .*"),
     "not a share": (("at_least = 0.95", "at_least = 0.95\nworst_share = 1.5"),

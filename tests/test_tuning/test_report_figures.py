@@ -1,9 +1,12 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
 from scenarios.drawing import new_figure
 from tests.test_tuning.findings_by_hand import GOALS, PARAMETERS, VALUES, agreement, evaluations, findings
+from tuning.analysis import chosen_by_hand
 from tuning.evaluations import Evaluations
 from tuning.objectives import Goals, Statistic
 from tuning.report_figures import (
@@ -15,6 +18,8 @@ from tuning.report_figures import (
     in_units,
     optimism_figure,
     parallel_figure,
+    parallel_table,
+    stability_figure,
     sweep_figure,
     sweeps,
 )
@@ -59,6 +64,39 @@ def test_without_held_out_and_candidates_the_front_stands_alone():
     assert {line.get_label() for line in drawn.lines} == {"front", "default constants", "recommended"}
 
 
+def test_numbered_members_carry_the_numbers_of_the_tables():
+    found = findings()
+    twins = replace(found, front=(*found.front, found.front[0]))
+    for ax in front_figure(twins, numbered=True).axes:
+        assert [text.get_text() for text in ax.texts] == ["1, 4", "2", "3"]
+
+
+def test_a_member_chosen_by_hand_is_drawn_as_chosen():
+    found = chosen_by_hand(findings(), 2, evaluations(seed=1), np.arange(len(VALUES)), 0)
+    third = found.front[2].training.objectives
+    drawn = drawn_points(front_figure(found).axes[0], "chosen")
+    np.testing.assert_allclose(drawn, [[100 * third[0].value, third[1].value]])
+
+
+def test_parallel_coordinates_have_the_default_last_and_units():
+    found = findings()
+    names, table = parallel_table(replace(found, parameters=("clearance_cap", *PARAMETERS[1:])))
+    assert names[0] == "clearance cap [m]"
+    np.testing.assert_array_equal(table[:, :3], VALUES[[4, 5, 6, 0]])
+    assert table[-1, 3] == 100 * found.default.training.success.value
+
+
+def test_stability_has_a_row_a_rule_and_frames_what_each_picks():
+    ax = stability_figure(findings()).axes[0]
+    assert [tick.get_text() for tick in ax.get_yticklabels()] == ["not dominated", "knee", "constraint"]
+    assert [tick.get_text() for tick in ax.get_xticklabels()] == ["1", "2", "3"]
+    assert [text.get_text() for text in ax.texts] == ["90", "80", "30", "70", "20", "10", "25", "35", "30"]
+    frames = [patch.get_xy() for patch in ax.patches]
+    assert frames == [(-0.5, 0.5), (0.5, 1.5)]  # knee: member 1; constraint: member 2
+    by_hand = chosen_by_hand(findings(), 2, None, np.array([]), 0)
+    assert len(stability_figure(by_hand).axes[0].get_yticklabels()) == 3
+
+
 def test_one_objective_alone_is_drawn_by_candidate(training):
     found = findings()
     alone = type(found)(**vars(found) | {"goals": Goals(GOALS.objectives[:1])})
@@ -70,7 +108,7 @@ def test_one_objective_alone_is_drawn_by_candidate(training):
 def test_parallel_coordinates_run_from_the_least_to_the_most_of_what_is_shown():
     ax = parallel_figure(findings()).axes[0]
     assert [tick.get_text() for tick in ax.get_xticklabels()][:4] == [
-        "clearance", "local heading", "progress", "success rate"]  # fmt: skip
+        "clearance", "local heading", "progress", "success rate [%]"]  # fmt: skip
     texts = [text.get_text() for text in ax.texts]
     assert texts[:2] == ["0.4", "0.05"]  # clearance of rows 0, 4, 5, 6: 0.1, 0.3125, 0.4, 0.05
     default = drawn_points(ax, "default constants")

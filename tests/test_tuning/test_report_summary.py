@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 
 from tests.test_tuning.findings_by_hand import evaluations, findings, job
+from tuning.analysis import chosen_by_hand
 from tuning.findings import Comparison, Interval
 from tuning.objectives import Statistic
 from tuning.report_summary import (
     SUCCESS,
+    choices_table,
     constants_table,
     honest_reading,
     objectives_table,
@@ -57,6 +59,16 @@ def test_the_verdict_looks_at_success_even_where_it_is_no_objective():
     assert "worse in success rate" in verdict(found)
 
 
+def test_tables_call_a_member_chosen_by_hand_chosen():
+    found = chosen_by_hand(findings(), 1, None, np.array([]), 0)
+    for table in (success_table(found), constants_table(found), objectives_table(found)):
+        assert "chosen" in table
+        assert "recommended" not in table
+    assert "0.4" in constants_table(found)  # clearance of row 5
+    assert "by hand (chosen)" in choices_table(found)
+    assert "nan" not in choices_table(found) + honest_reading(found)
+
+
 def test_where_the_default_is_recommended_it_is_said():
     found = findings()
     front = (replace(found.front[0], values=found.default.values), *found.front[1:])
@@ -90,6 +102,7 @@ def test_values_carry_their_unit_and_interval():
     assert shown(TIME, Interval(30.25, 29.0, 31.5)) == f"30.2 s [29.0,{space}31.5]"
     assert shown(TIME, Interval(np.nan, np.nan, np.nan)) == "–"
     assert shown_difference(SUCCESS, Interval(-0.01, -0.05, 0.0)) == f"-1.0 [-5.0,{space}+0.0]"
+    assert shown_difference(TIME, Interval(0.5, 0.25, 0.75)) == f"+0.500 s [+0.250,{space}+0.750]"
 
 
 def test_tables_hold_both_suites_and_both_sets_of_constants():

@@ -6,18 +6,21 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from scenarios.errors import InputError
+from scenarios.suite import make_suite
 from tests.test_tuning.jobs import CANDIDATES, JOB, SCENARIOS, in_small_pieces, pairs_driven, results_of, written
 from tuning import racing, tiled_judge
+from tuning.evaluate import evaluate
 from tuning.job_folder import events_of, locked
 from tuning.plans_only import PLANNED
-from tuning.run_job import read_setup, report_job, resume_job, run_job
-from tuning.store import as_evaluations, open_evaluations
+from tuning.run_job import open_job, read_setup, report_job, resume_job, run_job
+from tuning.store import FIGURES, as_evaluations, open_evaluations, read_store
 from tuning.weights_file import load_weights
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -96,8 +99,61 @@ def test_the_dataset_has_dimensions_units_and_a_table(whole):
     assert dict(dataset["length"].sizes) == {"candidate": CANDIDATES, "scenario": SCENARIOS}
     assert (dataset["length"].units, dataset["jerk"].units) == ("m", "m/s³")
     assert dataset["outcome"].dtype == np.int32
-    assert len(dataset.to_dataframe()) == CANDIDATES * SCENARIOS
+    assert dataset["clearance"].dims == ("candidate",)
+    assert dataset["clearance"].units == ""  # a weight
     assert dict(open_evaluations(whole, "held_out").sizes)["scenario"] == 3
+
+
+def test_the_table_has_a_row_an_episode_under_its_candidate_and_scenario(whole):
+    frame = open_evaluations(whole).to_dataframe()
+    assert frame.index.names == ["candidate", "scenario"]
+    assert len(frame) == CANDIDATES * SCENARIOS
+    assert {*FIGURES, "done", "generation", "clearance", "velocity"} == set(frame.columns)
+    found, (_, name, *_) = read_store(whole / "training.zarr")
+    episode = frame.loc[(3, name)]
+    assert episode["time"] == found.columns["time"][3, 1]
+    assert episode["velocity"] == found.values[3, 1]
+    means = frame.groupby("candidate")["length"].mean()
+    np.testing.assert_allclose(means, found.columns["length"].mean(axis=1), rtol=1e-5)
+
+
+class TestOpened:
+    def test_it_holds_what_the_report_was_made_of_and_writes_nothing(self, whole):
+        before = results_of(whole)
+        job = open_job(whole)
+        assert results_of(whole) == before
+        reported = report_job(whole, quiet=True)
+        assert [member.row for member in job.findings.front] == [member.row for member in reported.front]
+        assert job.findings.compared == reported.compared
+        assert job.setup.held_out.names == make_suite("paper-15", 2, 3).names
+
+    def test_a_members_held_out_results_are_those_of_driving_it(self, whole):
+        job = open_job(whole)
+        for number in (0, 1):
+            driven, kept = evaluate(job.setup.held_out, job.preset(number)), job.held_out_results(number)
+            np.testing.assert_array_equal(kept.outcome, driven.outcome)
+            np.testing.assert_array_equal(kept.measures["time"], driven.measures["time"])
+
+    def test_numbers_are_those_of_the_tables(self, whole):
+        job = open_job(whole)
+        last = len(job.findings.front)
+        assert job.member(0) is job.findings.default
+        assert job.member(last) is job.findings.front[-1]
+        chosen = job.choosing(last)
+        assert chosen.choices[chosen.recommended].member == last - 1
+        with pytest.raises(InputError, match=rf"^member: {last + 1}; must be from 1 to {last}, or 0 for the default; "):
+            job.preset(last + 1)
+        with pytest.raises(InputError, match=r"^member: 0; .*; choose a member of the front, from 1$"):
+            job.choosing(0)
+
+    def test_what_was_not_driven_is_told(self, whole):
+        job = open_job(whole)
+        with pytest.raises(InputError, match=r"^member: 1; was not driven on the held-out scenarios; "):
+            replace(job, held_out=None).held_out_results(1)
+
+    def test_a_folder_without_a_job_is_refused(self, tmp_path):
+        with pytest.raises(InputError, match="no job"):
+            open_job(tmp_path)
 
 
 def test_another_run_ends_in_the_same_bytes_and_a_finished_one_stays_as_it_is(whole, file, tmp_path):
