@@ -1,6 +1,7 @@
 """A loss over a few constants: of the hard planner, of the relaxed one that stands for it, and the slopes of both.
 
-Dimension letters: C candidates; D parameters; O objectives; B points; P pairs of probes; S scenarios; R resamples.
+Dimension letters: C candidates; D parameters; O objectives; B points; P pairs of probes; S scenarios, S' of them seen
+by the surrogate; R resamples.
 """
 
 from collections.abc import Sequence
@@ -19,6 +20,7 @@ from tuning.gradients import (
     LOW,
     Probes,
     Scaling,
+    agreement,
     cosine,
     hard_slopes,
     mean_slopes,
@@ -41,6 +43,7 @@ class Terrain:
     weights: np.ndarray  # [O] of the objectives, sum 1
     suite: Suite  # S scenarios, common to all
     look: Look  # where the surrogate looks
+    seen: int  # of the scenarios, the first ones: S' that the surrogate looks at, which costs more than driving
 
 
 class Probed(NamedTuple):
@@ -81,12 +84,12 @@ def hard_losses(terrain: Terrain, judged: Judged, scaling: Scaling, drawn: np.nd
 
 def recorded_at(terrain: Terrain, unit: np.ndarray) -> list[Recorded]:
     """States on the way of the hard episodes of constants [C, D], from which the relaxed planner starts."""
-    return record(terrain.space, unit, terrain.suite.scenarios, terrain.look)
+    return record(terrain.space, unit, terrain.suite.scenarios[: terrain.seen], terrain.look)
 
 
 def relaxed_at(terrain: Terrain, unit: np.ndarray, rows: Sequence[Recorded],
                softness: Softness) -> tuple[np.ndarray, np.ndarray]:
-    """The surrogate's losses [C, S] and gradients [C, S, D]; rows: recorded for the same [C, D]."""
+    """The surrogate's losses [C, S'] and gradients [C, S', D]; rows: recorded for the same [C, D]."""
     weights = np.repeat(loss_weights(terrain.goals, terrain.weights[None]), len(unit), axis=0)
     return surrogate(terrain.space, unit, weights, rows, terrain.look, softness)
 
@@ -110,15 +113,25 @@ def hard_slopes_at(terrain: Terrain, found: Probed, scaling: Scaling, resamples:
     ])  # fmt: skip
 
 
-def relaxed_slopes_at(each: np.ndarray, resamples: int, seed: int) -> np.ndarray:
-    """[B, 1 + R, D] of gradients [B, S, D]; the same resamples as those of `hard_slopes_at`, of as many scenarios."""
+def resampled(each: np.ndarray, resamples: int, seed: int) -> np.ndarray:
+    """[B, 1 + R, D] mean over scenarios of gradients [B, S', D]; each resample is of the same ones at every point."""
     return np.stack([mean_slopes(one, resamples, np.random.default_rng(seed)) for one in each])
 
 
 def own_slopes(probes: Sequence[Probes], losses: np.ndarray) -> np.ndarray:
-    """[B, S, D] slope of a loss by its values [B · 2P, S] at the probes: what a gradient of it should be."""
+    """[B, S', D] slope of a loss by its values [B · 2P, S'] at the probes: what a gradient of it should be."""
     parts = np.split(losses, len(probes))
     return np.stack([slope(part.T, probe) for part, probe in zip(parts, probes, strict=True)])
+
+
+def agreement_at(first: np.ndarray, second: np.ndarray) -> dict[str, np.ndarray]:
+    """[B] each, of gradients [B, 1 + R, D]: `cosine`, `cosine_low`, `cosine_high` and `sign_agreement`."""
+    found = [agreement(one, other) for one, other in zip(first, second, strict=True)]
+    return {
+        "cosine": np.array([one.cosine for one in found]), "cosine_low": np.array([one.low for one in found]),
+        "cosine_high": np.array([one.high for one in found]),
+        "sign_agreement": np.array([one.sign.mean() for one in found]),
+    }  # fmt: skip
 
 
 def mean_cosine(first: np.ndarray, second: np.ndarray) -> Interval:
@@ -131,29 +144,44 @@ def sign_agreement(first: np.ndarray, second: np.ndarray) -> Interval:
     return interval((np.sign(first) == np.sign(second)).mean(axis=(0, 2)))
 
 
-def halves_agree(terrain: Terrain, found: Probed, scaling: Scaling) -> float:
-    """Mean cosine over the points between the hard gradients of every other scenario and of the rest.
+def halves_agree(terrain: Terrain, found: Probed, scaling: Scaling, splits: int, seed: int) -> Interval:
+    """Mean cosine over the points between the hard gradients of one half of the scenarios and of the other, over random
+    splits: their mean and 95 % of them.
 
-    What a perfect surrogate could not expect to exceed by much: below 1 there is chance in the hard gradient itself.
+    How much chance there is in the hard gradient: a surrogate with the right gradient would agree about so well.
     """
-    scenarios = np.arange(len(terrain.suite.scenarios))
-    first, second = (hard_slopes_at(terrain, found, scaling, 0, 0, scenarios[start::2])[:, 0] for start in (0, 1))
-    return float(cosine(first, second).mean())
+    random, scenarios = np.random.default_rng(seed), len(terrain.suite.scenarios)
+    return interval(_mean_first([_half_against_half(terrain, found, scaling, random.permutation(scenarios))
+                                 for _ in range(splits)]))  # fmt: skip
 
 
 def rank_agreement(terrain: Terrain, judged: Judged, scaling: Scaling, losses: np.ndarray, resamples: int,
                    seed: int) -> Interval:
-    """Spearman's rank correlation over the C candidates between hard and relaxed loss [C, S]: 1 is the same order."""
-    scenarios, random = losses.shape[1], np.random.default_rng(seed)
-    drawn = [np.arange(scenarios), *random.integers(scenarios, size=(resamples, scenarios))]
-    return interval(np.array([_rank(hard_losses(terrain, judged, scaling, at), losses[:, at].mean(axis=1))
-                              for at in drawn]))  # fmt: skip
+    """Spearman's rank correlation over the C candidates of hard and relaxed loss [C, S']: 1 is the same order."""
+    random = np.random.default_rng(seed)
+    hard, relaxed = (_with_resamples(count, resamples, random) for count in (judged.done.shape[1], losses.shape[1]))
+    return interval(np.array([_rank(hard_losses(terrain, judged, scaling, those), losses[:, these].mean(axis=1))
+                              for those, these in zip(hard, relaxed, strict=True)]))  # fmt: skip
 
 
 def interval(estimates: np.ndarray) -> Interval:
     """Of an estimate and its resamples, [1 + R]."""
     low, high = np.percentile(estimates[1:] if len(estimates) > 1 else estimates, [LOW, HIGH])
     return Interval(float(estimates[0]), float(low), float(high))
+
+
+def _with_resamples(scenarios: int, resamples: int, random: np.random.Generator) -> np.ndarray:
+    """[1 + R, S] all scenarios, then draws of as many with replacement."""
+    return np.concatenate([np.arange(scenarios)[None], random.integers(scenarios, size=(resamples, scenarios))])
+
+
+def _half_against_half(terrain: Terrain, found: Probed, scaling: Scaling, order: np.ndarray) -> float:
+    first, second = (hard_slopes_at(terrain, found, scaling, 0, 0, half)[:, 0] for half in np.array_split(order, 2))
+    return float(cosine(first, second).mean())
+
+
+def _mean_first(values: Sequence[float]) -> np.ndarray:
+    return np.array([np.mean(values), *values])
 
 
 def _rank(first: np.ndarray, second: np.ndarray) -> float:

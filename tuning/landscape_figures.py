@@ -1,6 +1,6 @@
 """Pictures of what gradients see: a loss over two constants, arrows, a softened decision, a smoothed search.
 
-Conventions: `scenarios.drawing`. Fields go from light (good) to dark (bad), with lines of equal value.
+Conventions: `scenarios.drawing`. Fields go from light to dark as they grow.
 Dimension letters: A, U values across and up; B points; L temperatures; X values.
 """
 
@@ -19,12 +19,11 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-DARKEST = 0.75  # of cividis, so that arrows and lines can be told from the field
+DARKEST = 0.75  # of cividis, so that arrows can be told from the field
 HARD = {"facecolor": BLACK, "edgecolor": "white"}
 SOFT = {"facecolor": "white", "edgecolor": BLACK}
 LINES = ("-", "--", "-.", ":")
 LINE_COLOURS = (BLUE, ORANGE, VERMILLION, BLACK)
-DOTS = 240.0  # area of the mark of a candidate whose share is 1 [pt²]
 
 
 class Arrows(NamedTuple):
@@ -48,6 +47,7 @@ def landscape_figure(space: Space, unit: np.ndarray, hard: np.ndarray, relaxed: 
         if arrows is not None:
             _draw_arrows(space, arrows.points, arrows.hard, ax, "downhill by the hard gradient", HARD)
             _draw_arrows(space, arrows.points, arrows.relaxed, ax, "downhill by the surrogate's gradient", SOFT)
+            _number(space.values(arrows.points), ax)
     figure_legend(figure_of(axes[0]), list(axes))
     return figure_of(axes[0])
 
@@ -132,13 +132,10 @@ def smoothed_figure(found: Smoothed, name: str = "expansions", unit: str = "1",
 
 
 def _draw_losses(space: Space, unit: np.ndarray, losses: np.ndarray, ax: "Axes", label: str) -> None:
-    """A field over the two constants with lines of equal value, and the base's own constants."""
+    """A field over the two constants, its least, and the base's own constants."""
     x, y = (np.unique(column) for column in space.values(unit).T)
     field = np.reshape(losses, (len(y), len(x)))
     image = ax.pcolormesh(x, y, field, cmap=_light_to_dark(), shading="nearest")
-    if np.ptp(field) > 0:
-        lines = ax.contour(x, y, field, levels=6, colors=BLACK, linewidths=0.6)
-        ax.clabel(lines, fontsize=FONT - 3, fmt="%.2g")
     bar = figure_of(ax).colorbar(image, ax=ax, shrink=0.9, pad=0.02)
     bar.set_label(label, fontsize=FONT)
     bar.ax.tick_params(labelsize=FONT - 1)
@@ -160,17 +157,26 @@ def _draw_arrows(space: Space, points: np.ndarray, slopes: np.ndarray, ax: "Axes
               linewidth=0.8, zorder=5, label=label, **style)  # fmt: skip
 
 
+def _number(points: np.ndarray, ax: "Axes") -> None:
+    for number, point in enumerate(points, start=1):
+        ax.annotate(str(number), point, ha="center", va="center", fontsize=FONT - 2, zorder=7,
+                    bbox={"boxstyle": "circle,pad=0.15", "facecolor": "white", "edgecolor": BLACK, "linewidth": 0.6})
+
+
 def _draw_share(found: Softened, place: int, ax: "Axes") -> None:
-    turn, speed = np.meshgrid(found.yaw_rate, found.v)
-    ax.scatter(turn, speed, s=4, color=CELL_LINES)
-    ax.scatter(turn, speed, s=DOTS * found.share[place], facecolor=BLUE, edgecolor=BLACK, linewidth=0.4, zorder=3,
-               label="share of a candidate, by area")  # fmt: skip
-    mean = np.einsum("vn,vnk->k", found.share[place], np.stack([turn, speed], axis=-1))
-    ax.plot(*mean, marker="X", markersize=10, color=ORANGE, markeredgecolor=BLACK, linestyle="none", zorder=4,
-            label="mean of the shares")  # fmt: skip
-    ax.set_title(f"temperature {found.temperatures[place]:g}", fontsize=FONT)
+    share = found.share[place]
+    image = ax.pcolormesh(found.yaw_rate, found.v, share / share.max(), cmap="Blues", vmin=0.0, vmax=1.0,
+                          shading="nearest", edgecolors=CELL_LINES, linewidth=0.3)  # fmt: skip
+    if place == len(found.temperatures) - 1:
+        bar = figure_of(ax).colorbar(image, ax=ax, pad=0.02)
+        bar.set_label("share ÷ largest share [1]", fontsize=FONT)
+        bar.ax.tick_params(labelsize=FONT - 1)
+    ax.plot(share.sum(axis=0) @ found.yaw_rate, share.sum(axis=1) @ found.v, marker="X", markersize=10, color=ORANGE,
+            markeredgecolor=BLACK, linestyle="none", label="mean of the shares")  # fmt: skip
+    ax.set_title(f"temperature {found.temperatures[place]:g}, largest share {share.max():.1%}", fontsize=FONT)
     ax.invert_xaxis()  # turns to the left on the left
     _dress(ax, "yaw rate [rad/s], to the left > 0", "speed [m/s]" if place == 0 else "")
+    ax.grid(visible=False)
 
 
 def _draw_command(found: Softened, ax: "Axes") -> None:
@@ -191,8 +197,8 @@ def _dress(ax: "Axes", across: str, up: str) -> None:
 
 
 def _light_to_dark() -> Any:
-    """Cividis from its light end (good) without its darkest part."""
+    """Cividis from its light end, without its darkest part."""
     from matplotlib import colormaps
     from matplotlib.colors import LinearSegmentedColormap
 
-    return LinearSegmentedColormap.from_list("light is good", colormaps["cividis_r"](np.linspace(0.0, DARKEST, 64)))
+    return LinearSegmentedColormap.from_list("light to dark", colormaps["cividis_r"](np.linspace(0.0, DARKEST, 64)))

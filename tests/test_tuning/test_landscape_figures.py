@@ -67,9 +67,11 @@ def test_agreement_is_shown_over_the_temperature():
 
 
 def test_a_softened_decision_shows_shares_their_mean_and_the_command_over_the_weight():
-    cold, warm, command = softened_figure(SOFTENED).axes
+    cold, warm, command = softened_figure(SOFTENED).axes[:3]
     assert the(cold, "mean of the shares").get_xydata().tolist() == [[1.0, 0.2]]
     assert the(warm, "mean of the shares").get_xydata().tolist() == pytest.approx(np.array([[0.0, 0.3]]))
+    assert cold.collections[0].get_array().tolist() == [[0.0, 1.0], [0.0, 0.0]]
+    assert warm.get_title() == "temperature 0.1, largest share 25.0%"
     assert the(command, "hard planner").get_ydata().tolist() == [1.0, -1.0]
     assert the(command, "temperature 0.1").get_ydata().tolist() == [0.1, 0.0]
     assert command.get_ylabel() == "yaw rate commanded [rad/s]"
