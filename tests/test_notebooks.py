@@ -11,7 +11,7 @@ from nbclient.exceptions import CellExecutionError
 
 FOLDER = Path(__file__).resolve().parents[1] / "notebooks"
 NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
-PICTURES = {"01_pipeline": 8, "02_astar": 8, "03_dynamic_obstacles": 5, "04_pareto": 6,
+PICTURES = {"01_pipeline": 8, "02_astar": 8, "03_dynamic_obstacles": 5, "04_pareto": 6, "05_gradients": 6,
             "06_your_own_map": 7}  # at least; others: 1  # fmt: skip
 SECONDS = 600  # a cell's, where nothing is compiled yet and the machine is busy
 

@@ -273,9 +273,11 @@ def optimism_figure(findings: Findings) -> "Figure":
     return figure
 
 
-def agreement_figure(agreement: Mapping[str, np.ndarray], ax: "Axes | None" = None) -> "Figure":
+def agreement_figure(agreement: Mapping[str, np.ndarray], place_name: str = "start",
+                     ax: "Axes | None" = None) -> "Figure":
     """Cosine between the surrogate's gradient and the hard planner's at each start, with its 95 % interval, and the
-    share of parameters whose signs agree. cosine, cosine_low, cosine_high, sign_agreement: [S].
+    share of parameters whose signs agree. cosine, cosine_low, cosine_high, sign_agreement: [S]. place_name: what a
+    start is called.
     """
     if ax is None:
         ax = new_figure((6.2, 3.2)).subplots()
@@ -288,7 +290,7 @@ def agreement_figure(agreement: Mapping[str, np.ndarray], ax: "Axes | None" = No
             markeredgecolor=BLACK, label="share of signs that agree")  # fmt: skip
     ax.axhline(0.0, color=BLACK, linewidth=0.8, linestyle="--")
     ax.set(ylim=(-1.05, 1.05), xlim=(-0.5, len(cosine) - 0.5))
-    _label_axes(ax, "start", "agreement")
+    _label_axes(ax, place_name, "agreement")
     ax.set_xticks(place, [str(index + 1) for index in place])
     figure_legend(figure_of(ax), [ax])
     return figure_of(ax)

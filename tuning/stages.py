@@ -56,6 +56,17 @@ class Moment(NamedTuple):
     chosen: tuple[int, int] | None  # (speed, yaw rate); None: nothing was admissible, the robot brakes
 
 
+class Situation(NamedTuple):
+    """What one decision is taken from."""
+
+    scenario: Scenario  # padded
+    field: DistanceField
+    robot: RobotState
+    known: np.ndarray  # [S] bool
+    target: np.ndarray  # [2] (x, y) [m]
+    time: Scalar  # since the start [s]
+
+
 def densities(scenario: Scenario, config: Preset) -> Densities:
     """Density and ω for every cell of the scenario's map, as the planner sees them. Unbatched."""
     grid = jax.tree.map(jnp.asarray, scenario.grid)
@@ -69,6 +80,15 @@ def densities(scenario: Scenario, config: Preset) -> Densities:
 def moment(driven: Replay, config: Preset, step: int) -> Moment:
     """The decision of control step `step`, counted from 0, of a drive by the paper's planner.
 
+    config: that of the drive. Raises InputError as `situation_at` does.
+    """
+    here, constants = situation_at(driven, config, step), jax.tree.map(np.float32, config.constants)
+    return _on_host(here, jax.device_get(_decided(here, constants, config.options)))
+
+
+def situation_at(driven: Replay, config: Preset, step: int) -> Situation:
+    """What control step `step`, counted from 0, of a drive by the paper's planner decided on.
+
     config: that of the drive. Raises InputError for a step that was not driven, for a planner with rules beyond the
     paper and for hidden cells.
     """
@@ -79,14 +99,17 @@ def moment(driven: Replay, config: Preset, step: int) -> Moment:
         raise InputError("moment: a planner with rules beyond the paper, or a scenario with hidden cells; what it "
                          "knows is not kept; drive with `paper` on a known map")  # fmt: skip
     keep_compiled()
-    constants = jax.tree.map(np.float32, config.constants)
-    robot, known = _before(driven, step, constants.behaviour.dt)
-    target = np.asarray(driven.trace.target)[step]
+    dt = np.float32(config.constants.behaviour.dt)
+    robot, known = _before(driven, step, dt)
     scenario = pad(driven.scenario, padded_shape(driven.scenario))
-    time = step * constants.behaviour.dt
-    found = jax.device_get(_decided(scenario, driven.plan.field, robot, known, target, time, constants,
-                                    config.options))  # fmt: skip
-    return _on_host(robot, target, float(time), found)
+    return Situation(scenario, driven.plan.field, robot, known, np.asarray(driven.trace.target)[step], step * dt)
+
+
+def sensed_at(here: Situation, constants: Constants) -> Sensed:
+    """What the robot senses. Unbatched."""
+    scenario = here.scenario
+    return sense(scenario.squares, jnp.asarray(here.known), scenario.movers, movers_at(scenario.movers, here.time),
+                 jnp.stack([here.robot.x, here.robot.y]), constants.behaviour.sensor_range)  # fmt: skip
 
 
 def _before(driven: Replay, step: int, dt: Scalar) -> tuple[RobotState, np.ndarray]:
@@ -120,16 +143,14 @@ def _densities(grid: Grid, start: jax.Array, goal: jax.Array, constants: Constan
 
 
 @partial(jax.jit, static_argnames="options")
-def _decided(scenario: Scenario, field: DistanceField, robot: RobotState, known: jax.Array, target: jax.Array,
-             time: jax.Array, constants: Constants, options: Options) -> _Decided:
+def _decided(here: Situation, constants: Constants, options: Options) -> _Decided:
     """The steps of `control_step` up to the decision."""
-    dt, steps = constants.behaviour.dt, options.dwa.horizon_steps
-    sensed = sense(scenario.squares, known, scenario.movers, movers_at(scenario.movers, time),
-                   jnp.stack([robot.x, robot.y]), constants.behaviour.sensor_range)
+    dt, steps, robot = constants.behaviour.dt, options.dwa.horizon_steps, here.robot
+    sensed = sensed_at(here, constants)
 
     def decided(weights: ScoreWeights) -> Decision:
-        guidance = Guidance(target, jnp.asarray(scenario.goal))
-        return decide(robot, guidance, field, sensed, replace(constants, weights=weights), options)
+        guidance = Guidance(jnp.asarray(here.target), jnp.asarray(here.scenario.goal))
+        return decide(robot, guidance, here.field, sensed, replace(constants, weights=weights), options)
 
     def term(chosen: jax.Array) -> jax.Array:
         """The score is linear in the weights: with one of them alone it is that one's term. chosen: [4], 1 and 0s."""
@@ -147,17 +168,17 @@ def _decided(scenario: Scenario, field: DistanceField, robot: RobotState, known:
     )
 
 
-def _on_host(robot: RobotState, target: np.ndarray, time: float, found: _Decided) -> Moment:
-    candidates, sensed, index = found.decision.candidates, found.sensed, int(found.decision.index)
+def _on_host(here: Situation, found: _Decided) -> Moment:
+    robot, candidates, sensed, index = here.robot, found.decision.candidates, found.sensed, int(found.decision.index)
     v, yaw_rate, admissible, score, known = map(np.asarray, (candidates.v, candidates.yaw_rate, candidates.admissible,
                                                              candidates.score, sensed.square_known))  # fmt: skip
     arcs = np.stack([found.arcs.x, found.arcs.y], axis=-1)
-    here = np.broadcast_to(np.array([robot.x, robot.y], np.float32), arcs[:1].shape)
+    place = np.broadcast_to(np.array([robot.x, robot.y], np.float32), arcs[:1].shape)
     movers = np.concatenate([sensed.position[None], found.ahead])
     return Moment(
-        time=time, robot=robot, target=target, square_known=known,
+        time=float(here.time), robot=robot, target=here.target, square_known=known,
         movers=np.where(sensed.seen[:, None], movers, np.float32(np.nan)),
-        v=v, yaw_rate=yaw_rate, arcs=np.concatenate([here, arcs]),
+        v=v, yaw_rate=yaw_rate, arcs=np.concatenate([place, arcs]),
         admissible=admissible, score=score,
         terms=dict(zip(TERMS.values(), np.asarray(found.terms), strict=True)),
         chosen=divmod(index, len(yaw_rate)) if index >= 0 else None,
