@@ -180,7 +180,7 @@ def angle(dx, dy, c, s):
 
 @compiled
 def best_of(terms):
-    """The candidate with the largest weighted sum of terms, each over its sum; the first of equals; -1: there is none."""
+    """The candidate with the largest weighted sum of terms, each over its sum; the first of equals; -1 if none."""
     sums = np.zeros(4)
     for row in terms:
         if row[1] > 0.0:
