@@ -7,32 +7,28 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 
-from adwa_jax.constants import Constants, Options
-from adwa_jax.episode import Outcome
-from adwa_jax.lanes import drive_lanes
+from adwa_jax.constants import Constants
 from adwa_jax.presets import extended, paper
-from adwa_jax.scenario import Scenario
-from scenarios.padding import stack
 from scenarios.suite import make_suite
+from tests.benchmarks.agreement import numba_worlds
 from tests.benchmarks.inputs import scenarios
 from tests.benchmarks.timing import Figure, contest, rate_of
 from tests.benchmarks.yardstick import Yardstick
-from tests.test_adwa_jax.worlds import plan_by_hand
-from tests.yardstick_scenarios import LOOP, SAME_END, episode_options, field_of, key_points_of, scenarios_of
-from tuning.engine import Judged, judge_pairs, program_of, usable_cores
+from tests.yardstick_scenarios import LOOP, episode_options, scenarios_of
+from tuning.engine import Judged, judge_pairs, usable_cores
 
 BASE = paper()
+NUMBA_NOTE = "the control loop alone; plans and fields are given, which take the C++ program under 1 % of its time"
 
 
 def against_yardstick(yardstick: Yardstick | None, count: int = 1000) -> list[Figure]:
-    """Planning and driving the yardstick's scenarios with its constants; episodes and control steps a second."""
+    """Driving the yardstick's scenarios with its constants, planning included save in numba; episodes a second."""
     arrays = scenarios(count)
     worlds = scenarios_of(**arrays)
     steps: dict[str, float] = {}
@@ -47,47 +43,24 @@ def against_yardstick(yardstick: Yardstick | None, count: int = 1000) -> list[Fi
     contestants = {"adwa-jax": ours}
     if yardstick:
         contestants["C++ AVX-512"] = lambda: yardstick.rate("episodes", arrays, *episode_options())
-    figures = contest("closed loop 25 × 25, planning included", "episodes", contestants, rounds=3)
-    figures[0].note = f"{steps['adwa-jax']:,.0f} control steps a second"
+        contestants |= in_numba(yardstick, count)
+    figures = contest("closed loop, 25 × 25 m", "episodes", contestants, rounds=3)
+    figures[0].note = f"plans included, {steps['adwa-jax']:,.0f} control steps a second"
+    for figure in figures[1:]:
+        figure.note = NUMBA_NOTE if figure.who.startswith("numba") else "plans included"
     return figures
 
 
-def agreement(yardstick: Yardstick, count: int = 1000) -> dict[str, Any]:
-    """How many episodes end as the yardstick's do, from its plans and its field: the closed loop alone."""
-    arrays = scenarios(count)
-    theirs = yardstick.items("episodes", arrays, "--impl", "scalar", *episode_options())
-    kept = yardstick.items("keypts", {"maps": arrays["maps"]}, "--los", str(LOOP.behaviour.clearance_margin))
-    worlds = scenarios_of(**arrays)
-    options = program_of(worlds[0], LOOP, BASE.options).options
-    ends, lengths = [], []
-    for first in range(0, count, 50):
-        part = [_by_hand(world, record["key"]) for world, record in
-                zip(worlds[first : first + 50], kept[first : first + 50], strict=True)]  # fmt: skip
-        found = _driven(stack([world for world, _, _ in part]), np.stack([points for _, points, _ in part]),
-                        np.int32([number for _, _, number in part]), LOOP, options)  # fmt: skip
-        ends += [SAME_END[Outcome(outcome)] for outcome in found.outcome.tolist()]
-        lengths += found.measures.length.tolist()
-    same = np.array([end == record["kind"] for end, record in zip(ends, theirs, strict=True)])
-    apart = np.abs(np.array(lengths) - [record["length"] for record in theirs])
-    return {"count": count, "same outcome": float(same.mean()), "same path within 2 cm": float((apart < 0.02).mean()),
-            "success, ours": float(np.mean(np.array(ends) == 0)),
-            "success, theirs": float(np.mean([record["kind"] == 0 for record in theirs]))}  # fmt: skip
+def in_numba(yardstick: Yardstick, count: int) -> dict[str, Callable[[], float]]:
+    """The closed loop in numba on one core, as it runs when nothing is said, and on all; none without numba."""
+    if (worlds := numba_worlds(yardstick, count)) is None:
+        return {}
+    from tests.benchmarks.numba_episodes import driven
 
+    def on(threads: int) -> Callable[[], float]:
+        return lambda: rate_of(count, lambda: driven(worlds, threads))
 
-def _by_hand(world: Scenario, key: list) -> tuple[Scenario, np.ndarray, int]:
-    return world, key_points_of(key, world), len(key)
-
-
-@jax.jit
-def _plans(worlds: Scenario, points: jax.Array, counts: jax.Array) -> Any:
-    return jax.lax.map(lambda one: plan_by_hand(one[1], one[2], field_of(one[0].grid.occupied)),
-                       (worlds, points, counts))  # fmt: skip
-
-
-def _driven(worlds: Scenario, points: np.ndarray, counts: np.ndarray, constants: Constants, options: Options) -> Any:
-    plans = _plans(worlds, points, counts)
-    drive = jax.jit(drive_lanes, static_argnames="options")
-    return jax.device_get(drive(worlds, plans, jax.tree.map(jnp.float32, constants), options=options))
+    return {"numba, one core": on(1), "numba, all cores": on(usable_cores())}
 
 
 def presets(count: int = 512) -> list[Figure]:
@@ -100,7 +73,7 @@ def presets(count: int = 512) -> list[Figure]:
     return contest("episodes of paper-25", "episodes", {"paper": of(paper()), "extended": of(extended())}, rounds=3)
 
 
-def scaling(lanes: tuple[int, ...] = (8, 16, 32, 64), pairs: int = 1024) -> list[Figure]:
+def scaling(lanes: tuple[int, ...] = (8, 16, 32, 64), pairs: int = 1024) -> Iterator[list[Figure]]:
     """Lanes of a worker, workers, and how many pairs there are: the rate should not fall as they grow."""
     worlds = make_suite("paper-20", seed=0, count=128).scenarios
     weights = candidates(pairs // len(worlds))
@@ -108,12 +81,11 @@ def scaling(lanes: tuple[int, ...] = (8, 16, 32, 64), pairs: int = 1024) -> list
     def run(count: int = len(weights), **how: int) -> Any:
         return lambda: rate_of(count * len(worlds), lambda: judge_pairs(worlds, weights[:count], BASE.options, **how))
 
-    by_lanes = contest("lanes of a worker", "episodes", {str(width): run(lanes=width) for width in lanes}, rounds=2)
-    by_cores = contest("workers", "episodes", {str(count): run(workers=count)
-                                               for count in range(1, usable_cores() + 1)}, rounds=2)  # fmt: skip
-    by_pairs = contest("pairs", "episodes", {str(count * len(worlds)): run(count)
-                                             for count in (1, 2, 4, len(weights))}, rounds=2)  # fmt: skip
-    return [*by_lanes, *by_cores, *by_pairs]
+    yield contest("lanes of a worker", "episodes", {str(width): run(lanes=width) for width in lanes}, rounds=2)
+    yield contest("workers", "episodes", {str(count): run(workers=count)
+                                          for count in range(1, usable_cores() + 1)}, rounds=2)  # fmt: skip
+    yield contest("pairs", "episodes", {str(count * len(worlds)): run(count)
+                                        for count in (1, 2, 4, len(weights))}, rounds=2)  # fmt: skip
 
 
 def candidates(count: int) -> list[Constants]:

@@ -34,7 +34,7 @@ def against_peers(yardstick: Yardstick | None, side: int, count: int, chunk: int
         contestants["pyastar2d (cuts corners)"] = pyastar2d(few)
     if find_spec("python_motion_planning") and side < 512:
         contestants["python-motion-planning (cuts corners)"] = motion_planning(few[: 1000 // side])
-    return contest(f"A* {side} × {side}", "searches", contestants, rounds=3 if side == 512 else 5)
+    return contest(f"A*, {side} × {side} cells", "searches", contestants, rounds=3 if side == 512 else 5)
 
 
 def ours(grids: np.ndarray, chunk: int) -> Callable[[], float]:
