@@ -188,4 +188,4 @@ def _rank(first: np.ndarray, second: np.ndarray) -> float:
     """0 where one of them is flat."""
     if np.ptp(first) == 0 or np.ptp(second) == 0:
         return 0.0
-    return float(spearmanr(first, second).statistic)
+    return float(spearmanr(first, second)[0])  # pyright: ignore[reportArgumentType]

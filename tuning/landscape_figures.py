@@ -74,9 +74,10 @@ def temperature_figure(temperatures: Sequence[float], cosines: Sequence[Interval
     """Agreement of the surrogate's gradient with the hard one over the temperature of the choice, [L] each."""
     if ax is None:
         ax = new_figure((6.4, 3.6)).subplots()
-    for shift, found, name, style in ((0.96, cosines, "mean cosine", {"fmt": "o-", "color": BLUE}),
-                                      (1.04, signs, "share of signs that agree",
-                                       {"fmt": "D--", "color": ORANGE, "markeredgecolor": BLACK})):  # fmt: skip
+    styles: tuple[dict[str, Any], ...] = ({"fmt": "o-", "color": BLUE},
+                                          {"fmt": "D--", "color": ORANGE, "markeredgecolor": BLACK})  # fmt: skip
+    for shift, found, name, style in ((0.96, cosines, "mean cosine", styles[0]),
+                                      (1.04, signs, "share of signs that agree", styles[1])):  # fmt: skip
         value, low, high = np.array(found).T
         ax.errorbar(shift * np.asarray(temperatures), value, np.maximum([value - low, high - value], 0.0), capsize=3,
                     label=f"{name}, 95 % interval", **style)  # fmt: skip
@@ -149,7 +150,7 @@ def _draw_losses(space: Space, unit: np.ndarray, losses: np.ndarray, ax: "Axes",
 
 
 def _draw_arrows(space: Space, points: np.ndarray, slopes: np.ndarray, ax: "Axes", label: str,
-                 style: Mapping[str, str]) -> None:
+                 style: Mapping[str, Any]) -> None:
     """Of one length, from the points downhill; what has no slope gets none."""
     at, length = space.values(points), np.linalg.norm(slopes, axis=1, keepdims=True)
     down = -slopes / np.where(length > 0, length, 1.0)

@@ -40,7 +40,8 @@ def softened(driven: Replay, config: Preset, step: int, weight: str, values: np.
     here = situation_at(driven, config, step)
     constants = jax.tree.map(np.float32, config.constants)
     own = float(getattr(constants.weights, weight))
-    softness = Softness(np.asarray(temperatures, np.float32), np.full(len(temperatures), Softness().margin, np.float32))
+    margins = jnp.full(len(temperatures), Softness().margin, jnp.float32)
+    softness = Softness(jnp.asarray(temperatures, jnp.float32), margins)
     tried = np.append(own, values).astype(np.float32)  # the share is that of the first
     hard, soft = jax.device_get(_decisions(here, constants, tried, softness, config.options, weight))
     candidates = hard.candidates

@@ -64,7 +64,7 @@ class Situation(NamedTuple):
     robot: RobotState
     known: np.ndarray  # [S] bool
     target: np.ndarray  # [2] (x, y) [m]
-    time: Scalar  # since the start [s]
+    time: jax.Array  # since the start [s]
 
 
 def densities(scenario: Scenario, config: Preset) -> Densities:
@@ -99,7 +99,7 @@ def situation_at(driven: Replay, config: Preset, step: int) -> Situation:
         raise InputError("moment: a planner with rules beyond the paper, or a scenario with hidden cells; what it "
                          "knows is not kept; drive with `paper` on a known map")  # fmt: skip
     keep_compiled()
-    dt = np.float32(config.constants.behaviour.dt)
+    dt = jnp.float32(config.constants.behaviour.dt)
     robot, known = _before(driven, step, dt)
     scenario = pad(driven.scenario, padded_shape(driven.scenario))
     return Situation(scenario, driven.plan.field, robot, known, np.asarray(driven.trace.target)[step], step * dt)

@@ -52,7 +52,7 @@ def worlds_of(arrays: Arrays, key: list[list], field: Callable[[np.ndarray], np.
 
 
 def driven(worlds: Worlds, threads: int = 1) -> np.ndarray:
-    """[N, 3] how each episode ended, its control steps, and the metres driven; a thread that is free takes a few more."""
+    """[N, 3] how each episode ended, its control steps, and the metres driven; a free thread takes some more."""
     found = np.zeros((len(worlds.maps), 3))
     with ThreadPoolExecutor(threads) as pool:
         list(pool.map(lambda first: drive_some(worlds, first, found), range(0, len(found), AT_ONCE)))
