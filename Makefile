@@ -21,9 +21,9 @@ lint: $(STAMP)
 	$(BIN)/ruff check
 	$(BIN)/pyright
 
-# The README's picture.
+# The README's pictures; some of the demo's job, which is run first where it has not been.
 figures: $(STAMP)
-	$(BIN)/adwa drive --suite paper-25 --index 3 --figure notebooks/pictures/drive.png --animation out/drive.gif
+	$(BIN)/python -m notebooks.draw_pictures
 
 clean:
 	rm -rf .venv out dist .pytest_cache .ruff_cache .hypothesis .jax_cache

@@ -4,13 +4,11 @@ from pathlib import Path
 
 from adwa_jax import extended, paper
 from scenarios.suite import make_suite
-from tuning.animation import animate_drive
 from tuning.demo import run_demo
 from tuning.evaluate import evaluate
-from tuning.figures import drive_figure
 from tuning.gallery import grouped, sheet
 from tuning.outputs import save_figure
-from tuning.replay import replay
+from tuning.replay import draw_replay, replay
 from tuning.report_figures import front_figure, parallel_figure
 from tuning.run_job import open_job
 from tuning.stage_figures import decision_figure
@@ -31,9 +29,7 @@ def main() -> None:
 def draw_drive() -> None:
     """One drive of the extended planner, still and moving."""
     driven = replay(make_suite("paper-25", seed=0, count=4).scenarios[3], extended())
-    parts = driven.scenario, driven.plan, driven.episode, driven.trace
-    save_figure(lambda: drive_figure(*parts, title=driven.sentence(), robot=driven.robot), PICTURES / "drive.png")
-    animate_drive(PICTURES / "drive.gif", *parts, "extended", robot=driven.robot, speed=8.0)
+    draw_replay(driven, "extended", PICTURES / "drive.png", PICTURES / "drive.gif")
 
 
 def draw_decision() -> None:
