@@ -38,7 +38,7 @@ def smoothed(weight: np.ndarray, each: np.ndarray, reach: float) -> Smoothed:
     """
     step = float(weight[1] - weight[0])
     steps = round(reach / step)
-    if steps < 1 or 2 * steps >= len(weight) or not np.allclose([steps * step, *np.diff(weight)],
+    if steps < 1 or 2 * steps >= len(weight) - 1 or not np.allclose([steps * step, *np.diff(weight)],
                                                                  [reach, *np.full(len(weight) - 1, step)]):  # fmt: skip
         raise InputError(f"reach: {reach:g}; must be whole steps of evenly spaced values, {step:g} each, and twice it "
                          f"less than their span; change reach or values")  # fmt: skip

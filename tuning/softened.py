@@ -14,10 +14,13 @@ import numpy as np
 
 from adwa_jax.constants import Constants, Options
 from adwa_jax.dwa import Decision, Guidance, decide
+from adwa_jax.grid import Scalar
 from adwa_jax.presets import Preset
 from adwa_jax.relaxed import RelaxedDecision, Softness, relaxed_decide
 from tuning.replay import Replay
 from tuning.stages import Situation, sensed_at, situation_at
+
+MARGIN = Softness().margin  # [m] the gradient method's
 
 
 class Softened(NamedTuple):
@@ -35,12 +38,15 @@ class Softened(NamedTuple):
 
 
 def softened(driven: Replay, config: Preset, step: int, weight: str, values: np.ndarray,
-             temperatures: Sequence[float]) -> Softened:
-    """Control step `step` of a drive by the paper's planner. weight: of eq. 9. Raises as `stages.situation_at`."""
+             temperatures: Sequence[float], margin: Scalar = MARGIN) -> Softened:
+    """Control step `step` of a drive by the paper's planner. Raises as `stages.situation_at`.
+
+    weight: of eq. 9; margin: `Softness.margin` [m] at every temperature. Hard in the limit of both.
+    """
     here = situation_at(driven, config, step)
     constants = jax.tree.map(np.float32, config.constants)
     own = float(getattr(constants.weights, weight))
-    margins = jnp.full(len(temperatures), Softness().margin, jnp.float32)
+    margins = jnp.full(len(temperatures), margin, jnp.float32)
     softness = Softness(jnp.asarray(temperatures, jnp.float32), margins)
     tried = np.append(own, values).astype(np.float32)  # the share is that of the first
     hard, soft = jax.device_get(_decisions(here, constants, tried, softness, config.options, weight))

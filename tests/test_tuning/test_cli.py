@@ -687,7 +687,9 @@ class TestProcess:
     def test_ctrl_c_ends_the_work_with_130_and_no_traceback(self, folder):
         process = in_a_process("evaluate", "--suite", "paper-15", "--count", 100_000, cwd=folder,
                                env={**os.environ, "FORCE_COLOR": "1"})  # fmt: skip
-        assert process.stderr.read(1)  # the first of the progress bar: it is at work
+        shown = ""
+        while "/s" not in shown:  # the bar's rate: it is past compiling and at work
+            shown += process.stderr.read(1) or pytest.fail(shown)
         process.send_signal(signal.SIGINT)
         out, err = process.communicate(timeout=60)
         assert (process.returncode, out) == (130, "")

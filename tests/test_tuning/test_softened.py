@@ -38,7 +38,8 @@ def test_the_window_is_that_of_the_decision(driven, found):
     np.testing.assert_array_equal(found.yaw_rate, here.yaw_rate)
 
 
-def test_the_coldest_command_is_the_hard_one_for_every_value_of_the_weight(driven, found):
+def test_without_softness_the_command_is_the_hard_one_for_every_value_of_the_weight(driven):
+    found = softened(driven, paper(), 80, "clearance", VALUES, TEMPERATURES, margin=1e-5)
     assert found.hard.shape == (3, 2)
     np.testing.assert_allclose(found.soft[0], found.hard, atol=1e-3)
     np.testing.assert_allclose(found.hard[1], [driven.trace.robot.v[80], driven.trace.robot.yaw_rate[80]], atol=1e-5)
