@@ -18,7 +18,7 @@ from adwa_jax.presets import PRESETS
 from scenarios.suite import Suite, make_suite
 from tuning.engine import judge_pairs
 from tuning.gradients import Scaling, scaling_of
-from tuning.methods.gradient import Settings, gradient, starts_of
+from tuning.methods.gradient import LENGTHS, Settings, gradient, starts_of
 from tuning.methods.method import Problem
 from tuning.objectives import DEFAULT_OBJECTIVES, Goals, Scores
 from tuning.space import Parameter, Space
@@ -72,10 +72,11 @@ def judge(space: Space, points: np.ndarray, suite: Suite) -> Scores:
 def by_gradient(space: Space, training: Suite, seed: int, trust: str, starts: np.ndarray, weights: np.ndarray,
                 scaling: Scaling) -> Descent:
     """`ROUNDS` rounds of the method."""
-    settings = {"trust": trust, "resamples": 200}
-    lines = {"surrogate": 3, "hard": 3, "blend": 6}[trust]
-    probes = 8 * (1 if trust == "surrogate" else ROUNDS)  # the first round's tell the agreement
-    search = gradient(Problem(space, GOALS, seed, len(starts) * (1 + probes + lines * ROUNDS), training, settings))
+    settings = Settings(trust=trust)
+    proposals = {"surrogate": settings.steps, "hard": len(LENGTHS), "blend": settings.steps + len(LENGTHS)}[trust]
+    probes = 2 * settings.es_pairs * (1 if trust == "surrogate" else ROUNDS)  # the first round's tell the agreement
+    candidates = len(starts) * (1 + probes + proposals * ROUNDS)
+    search = gradient(Problem(space, GOALS, seed, candidates, training, settings.model_dump()))
     return followed(f"gradient, {trust}", space, training, search, len(starts), weights, scaling)
 
 
