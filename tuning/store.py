@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from itertools import groupby, product
 from pathlib import Path
+from shutil import rmtree
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -96,7 +97,7 @@ class Store:
     def _opened(self) -> dict[str, Any]:
         try:
             if not (self.path / "zarr.json").exists():
-                return _made(self.path, self._attributes, len(self.tiles), self.width)
+                _make(self.path, self._attributes, len(self.tiles), self.width)
             group = zarr.open_group(self.path, mode="r+")
             arrays = {name: group[name] for name in ("figures", "done", "values", "generation")}
             found = {key: group.attrs.get(key) for key in self._attributes}
@@ -177,21 +178,22 @@ def read_store(path: Path) -> tuple[Evaluations, tuple[str, ...]]:
     return Evaluations(parameters, values[:count], generation[:count], _columns(block, figures), done), names
 
 
-def _made(path: Path, attributes: Mapping[str, Any], tiles: int, width: int) -> dict[str, Any]:
-    """An empty store; its description is written last."""
-    group = zarr.create_group(path, attributes=dict(attributes), overwrite=True)
+def _make(path: Path, attributes: Mapping[str, Any], tiles: int, width: int) -> None:
+    """An empty store, moved to its place once it is whole."""
+    unfinished = path.with_name(f"{path.name}.partial")
+    group = zarr.create_group(unfinished, attributes=dict(attributes), overwrite=True)
     scenarios, parameters, figures = (len(attributes[key]) for key in ("scenarios", "parameters", "figures"))
 
-    def array(name: str, kind: str, fill: Any, shape: tuple[int, ...], chunks: tuple[int, ...], *names: str) -> Any:
-        return group.create_array(name, shape=(0, *shape), chunks=(1, *chunks), dtype=kind, fill_value=fill,
-                                  dimension_names=("candidate", *names))  # fmt: skip
+    def array(name: str, kind: str, fill: Any, shape: tuple[int, ...], chunks: tuple[int, ...], *names: str) -> None:
+        group.create_array(name, shape=(0, *shape), chunks=(1, *chunks), dtype=kind, fill_value=fill,
+                           dimension_names=("candidate", *names))  # fmt: skip
 
-    return {
-        "figures": array("figures", "float32", np.nan, (scenarios, figures), (width, figures), "scenario", "figure"),
-        "done": array("done", "uint64", 0, (tiles,), (tiles,), "tile"),
-        "values": array("values", "float64", np.nan, (parameters,), (parameters,), "parameter"),
-        "generation": array("generation", "int32", -1, (), ()),
-    }  # fmt: skip
+    array("figures", "float32", np.nan, (scenarios, figures), (width, figures), "scenario", "figure")
+    array("done", "uint64", 0, (tiles,), (tiles,), "tile")
+    array("values", "float64", np.nan, (parameters,), (parameters,), "parameter")
+    array("generation", "int32", -1, (), ())
+    rmtree(path, ignore_errors=True)  # no store: it has no description
+    unfinished.rename(path)
 
 
 def _holding(arrays: Mapping[str, Any], rows: slice, values: np.ndarray,

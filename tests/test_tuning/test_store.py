@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import zarr
 
 from adwa_jax.presets import paper
 from scenarios.errors import InputError
@@ -91,3 +92,21 @@ def test_what_a_killed_process_left_unfinished_is_removed(store):
     rubbish.write_bytes(b"half")
     opened(store)
     assert not rubbish.exists()
+
+
+def test_a_store_half_made_when_its_process_died_is_made_anew(tmp_path, monkeypatch):
+    create = zarr.Group.create_array
+
+    def dies_at_the_third(group, name, **how):
+        if name == "values":
+            raise SystemExit
+        return create(group, name, **how)
+
+    path = tmp_path / "some.zarr"
+    with monkeypatch.context() as dying:
+        dying.setattr(zarr.Group, "create_array", dies_at_the_third)
+        with pytest.raises(SystemExit):
+            Store(path, ("clearance", "lookahead"), NAMES)
+    made = Store(path, ("clearance", "lookahead"), NAMES)
+    assert not made.admit(0, VALUES, np.array([0, 1, 1])).any()
+    assert [place.name for place in tmp_path.iterdir()] == ["some.zarr"]
