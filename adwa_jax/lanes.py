@@ -157,15 +157,15 @@ def _in_whole_vectors(lanes: Lanes, options: Options) -> Lanes:
 def _has_stages(task: Task, options: Options) -> bool:
     """Whether `_step_as_printed` drives such tasks, one or many; static, and the same however many there are.
 
-    Only where it is known to compile: a compiler fails on a stage's operand that nothing reads, as happens where there
-    is nothing unknown, or where loops are of one turn. Nor on large maps, whose lanes take too much memory for whole
-    vectors of them.
+    Only on a CPU, which runs a stage as one function, and where it is known to compile: a compiler fails on a stage's
+    operand that nothing reads, as happens where there is nothing unknown, or where loops are of one turn. Nor on large
+    maps, whose lanes take too much memory for whole vectors of them.
     """
     scenario, rows, columns = task.scenario, *task.scenario.grid.occupied.shape[-2:]
     squares, movers = (obstacles.valid.shape[-1] for obstacles in (scenario.squares, scenario.movers))
-    return (as_printed(task.constants, options) and options.rules in PRINTED and options.dwa.horizon_steps > 1
-            and squares + movers > 0 and squares % VECTOR == 0 and movers % VECTOR == 0
-            and max(rows, columns) <= LARGEST_SIDE)  # fmt: skip
+    return (jax.default_backend() == "cpu" and as_printed(task.constants, options) and options.rules in PRINTED
+            and options.dwa.horizon_steps > 1 and max(rows, columns) <= LARGEST_SIDE
+            and squares + movers > 0 and squares % VECTOR == 0 and movers % VECTOR == 0)  # fmt: skip
 
 
 def _step_as_printed(lanes: Lanes, options: Options) -> EpisodeState:

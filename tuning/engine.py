@@ -33,7 +33,8 @@ FINEST_SPACING = 0.1  # [m]; the distance field is no finer, however many lattic
 # should stay in the cache, and because lanes without work, as there are at the end, cost as much as those with it.
 LANES = ((128, 32), (256, 16), (512, 8))
 FEWEST_LANES = 4
-FILLED_AT_ONCE = 4  # lanes that one call fills
+ON_ACCELERATOR = 128  # times as many lanes, of one worker
+FILLED_AT_ONCE = 4  # lanes that one call fills, of so few; of more lanes an eighth, as some end in every block
 LOOK = 0.2  # [s] between two looks at how far the work is
 BLOCK_STEPS = 32  # control steps between two looks at which lanes have ended; an episode has hundreds
 
@@ -61,13 +62,14 @@ def judge_pairs(scenarios: Sequence[Scenario], candidates: Sequence[Constants], 
     """Plan and drive every scenario with every candidate's constants.
 
     Nothing is compiled anew for other constants, scenarios of the same padded shape, or counts. lanes: of each worker,
-    by default as many as suit the map; workers: threads, by default one a core. `progress` is called from time to
-    time. On KeyboardInterrupt the blocks in progress are ended and what is done is returned: `done` says what that is.
+    by default as many as suit the map; workers: threads, by default one a core, or one for an accelerator. `progress`
+    is called from time to time. On KeyboardInterrupt the blocks in progress are ended and what is done is returned:
+    `done` says what that is.
     """
     keep_compiled()
     candidates = [jax.tree.map(np.float32, candidate) for candidate in candidates]
     table = Table(len(candidates), len(scenarios), progress)
-    count = usable_cores() if workers is None else workers
+    count = _workers() if workers is None else workers
     for program, pairs in pairs_by_program(scenarios, candidates, options).items():
         if table.stop:
             break
@@ -84,6 +86,10 @@ def usable_cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
+def _workers() -> int:
+    return usable_cores() if jax.default_backend() == "cpu" else 1
+
+
 def program_of(scenario: Scenario, constants: Constants, options: Options) -> Program:
     """The compiled program a scenario belongs to."""
     shape = padded_shape(scenario)
@@ -96,7 +102,8 @@ def program_of(scenario: Scenario, constants: Constants, options: Options) -> Pr
 def lanes_of(program: Program) -> int:
     """How many lanes a worker gets if nothing else is said; the same for any number of pairs."""
     side = max(program.shape.rows, program.shape.columns)
-    return next((lanes for limit, lanes in LANES if side <= limit), FEWEST_LANES)
+    lanes = next((lanes for limit, lanes in LANES if side <= limit), FEWEST_LANES)
+    return lanes if jax.default_backend() == "cpu" else lanes * ON_ACCELERATOR
 
 
 def pairs_by_program(scenarios: Sequence[Scenario], candidates: Sequence[Constants],
@@ -212,12 +219,13 @@ def _work(queue: _Queue, options: Options, width: int, table: Table) -> None:
     held: dict[int, _Held] = {}  # by lane
     while True:
         free = [lane for lane in range(width) if lane not in held]
-        for start in range(0, len(free), FILLED_AT_ONCE):
-            places = free[start : start + FILLED_AT_ONCE]
+        at_once = max(FILLED_AT_ONCE, width // 8)
+        for start in range(0, len(free), at_once):
+            places = free[start : start + at_once]
             taken = queue.take(len(places))
             if not taken:
                 break
-            lanes = _with(lanes, [task for _, task in taken], places[: len(taken)], options, width)
+            lanes = _with(lanes, [task for _, task in taken], places[: len(taken)], options, width, at_once)
             held |= dict(zip(places, (pair for pair, _ in taken), strict=False))
         if lanes is None or not held:
             return
@@ -226,10 +234,11 @@ def _work(queue: _Queue, options: Options, width: int, table: Table) -> None:
         lanes = moved
 
 
-def _with(lanes: Lanes | None, tasks: list[Task], places: list[int], options: Options, width: int) -> Lanes:
-    """The lanes with new episodes; idle ones are made first if there are none yet."""
+def _with(lanes: Lanes | None, tasks: list[Task], places: list[int], options: Options, width: int,
+          at_once: int) -> Lanes:
+    """The lanes with new episodes; idle ones are made first if there are none yet. at_once: rows that a call takes."""
     lanes = _idle(tasks[0], options, width) if lanes is None else lanes
-    missing = FILLED_AT_ONCE - len(tasks)
+    missing = at_once - len(tasks)
     rows = jax.tree.map(lambda *leaves: np.stack(leaves), *tasks, *tasks[:1] * missing)
     return _fill(lanes, rows, np.array(places + [0] * missing, np.int32), np.int32(len(tasks)))
 

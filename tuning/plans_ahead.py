@@ -5,6 +5,7 @@ alone, the survey, is shared by the plans of all candidates.
 """
 
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import AbstractContextManager
 from functools import partial
 from itertools import islice
 from typing import Any, NamedTuple
@@ -68,13 +69,15 @@ class Planner:
 
     def _make_surveys(self, pairs: list[Pair]) -> list[tuple[Scenario, Survey]]:
         padded = [pad(self._scenarios[pair.scenario], self._shape) for pair in pairs]
-        surveys = _surveys(stack(padded), self._stacked(pairs), self._options)
+        with _on_processor():
+            surveys = _surveys(stack(padded), self._stacked(pairs), self._options)
         return list(zip(padded, _rows(jax.device_get(surveys), len(pairs)), strict=True))
 
     def _make_plans(self, pairs: list[Pair]) -> list[tuple[Plan, dict[str, np.ndarray]]]:
         surveyed = [self._surveys.get(self._survey_key(pair)) for pair in pairs]
         scenarios, surveys = (_stacked(column) for column in zip(*surveyed, strict=True))
-        made = _plans(scenarios, surveys, self._stacked(pairs), self._options)
+        with _on_processor():
+            made = _plans(scenarios, surveys, self._stacked(pairs), self._options)
         return _rows(jax.device_get(made), len(pairs))
 
     def _stacked(self, pairs: list[Pair]) -> Constants:
@@ -142,6 +145,11 @@ def _surveys(tasks: Scenario, constants: Constants, options: Options) -> Survey:
 def _plans(tasks: Scenario, surveys: Survey, constants: Constants, options: Options) -> tuple[Plan, dict]:
     planned = plan_lanes(tasks.grid, tasks.start[:, :2], tasks.goal, constants, options.plan, surveys)
     return jax.vmap(for_driving)(planned), planned_columns(planned)
+
+
+def _on_processor() -> AbstractContextManager:
+    """Even where robots drive on an accelerator: a search, cell after cell, is no work for one."""
+    return jax.default_device(jax.local_devices(backend="cpu")[0])
 
 
 def _stacked(rows: Sequence[Any]) -> Any:

@@ -25,7 +25,7 @@ from tuning.engine import usable_cores
 
 ROBOT = RobotLimits(0.25, 0.0, 1.0, 1.5, acceleration=1.0, yaw_acceleration=3.0, brake=1.0, yaw_brake=1e9)
 OPTIONS = Options(dwa=DwaOptions(v_samples=11, yaw_rate_samples=21, horizon_steps=30, normalisation="sum"))
-SCENES, CHUNK = 1000, 125  # decisions; in one call
+SCENES, CHUNK = 1000, 125  # decisions; in one call of a core
 SCALAR_SCENES = 25  # for peers that take one at a time
 Scene = tuple[DistanceField, RobotState, Guidance, Sensed]
 
@@ -70,9 +70,10 @@ def decider(values: Constants, options: Options) -> Callable[[Scene], Decision]:
     return decided
 
 
-def decisions_a_second(decided: Callable[[Scene], Decision], scene: Scene, chunk: int = CHUNK) -> float:
-    """On all cores: a thread each, which takes chunk after chunk."""
+def decisions_a_second(decided: Callable[[Scene], Decision], scene: Scene) -> float:
+    """On all cores: a thread each, which takes chunk after chunk; on an accelerator all in one call."""
     count = len(scene[1].x)
+    chunk = CHUNK if jax.default_backend() == "cpu" else count
     parts = [jax.tree.map(lambda leaf, start=start: leaf[start : start + chunk], scene)
              for start in range(0, count, chunk)]  # fmt: skip
 
