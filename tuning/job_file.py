@@ -88,8 +88,8 @@ class SuiteTable(Table):
     sensed_only: bool = False
     unknown: Literal["free", "occupied"] = "occupied"
     resolution: float = Field(1.0, gt=0.0)  # [m]
-    unknown_obstacles: int = Field(5, ge=0, le=MOST_OBSTACLES)
-    movers: int = Field(5, ge=0, le=MOST_OBSTACLES)
+    unknown_obstacles: int | None = Field(None, ge=0, le=MOST_OBSTACLES)
+    movers: int | None = Field(None, ge=0, le=MOST_OBSTACLES)
 
     @model_validator(mode="after")
     def _one_kind_and_its_keys(self) -> "SuiteTable":

@@ -13,6 +13,7 @@ from adwa_jax.window import RobotLimits
 from scenarios.errors import InputError
 from scenarios.suite import SUITE_NAMES
 from tuning.robot_file import FARTHEST, FASTEST, SUFFIX, load_robot
+from tuning.sources import OBSTACLES
 from tuning.suite_files import KINDS
 from tuning.weights_file import load_weights
 
@@ -40,8 +41,8 @@ RangeOption = Annotated[float | None, typer.Option("--sensor-range", help="How f
 JsonOption = Annotated[Path | None, typer.Option("--json", help="Write the results as JSON to this file, or print: -")]
 UnknownOption = Annotated[UnknownPolicy, typer.Option(help="What a map's unknown cells count as.")]
 ResolutionOption = Annotated[float, typer.Option(help="Side of a pixel of a plain image, in metres.")]
-SquaresOption = Annotated[int, typer.Option(help="With --map: unknown static obstacles a scenario.")]
-MoversOption = Annotated[int, typer.Option(help="With --map: movers a scenario.")]
+SquaresOption = Annotated[int | None, typer.Option(help=f"With --map: unknown static obstacles; default: {OBSTACLES}.")]
+MoversOption = Annotated[int | None, typer.Option(help=f"With --map: movers; default: {OBSTACLES}.")]
 QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
 
 

@@ -16,7 +16,7 @@ from scenarios.suite import SUITE_NAMES, Suite, make_suite, suite_on_map, withou
 from tuning.console import note
 from tuning.suite_files import DEFAULT_COUNT, suite_in
 
-MOST_OBSTACLES = 10_000  # of each kind in a scenario
+OBSTACLES, MOST_OBSTACLES = 5, 10_000  # of each kind in a scenario on a user's map: by default, and at most
 Progress = Callable[[int, int], None]
 
 
@@ -40,8 +40,8 @@ class Source:
     seed: int
     unknown: str = "occupied"
     resolution: float = 1.0
-    squares: int = 0
-    movers: int = 0
+    squares: int | None = None  # on a map; None: OBSTACLES
+    movers: int | None = None
     sensed_only: bool = False
     index: int | None = None  # of the one scenario that is wanted; the count then follows
 
@@ -84,6 +84,10 @@ def read_suite(source: Source, robot_radius: float, quiet: bool, progress: Progr
     given = [option for option in (source.suite, source.suite_file, source.map) if option is not None]
     if len(given) != 1:
         raise InputError(f"--suite, --suite-file, --map: {len(given)} given; exactly one says what to drive; give one")
+    for option, value in _obstacles(source).items():
+        if value is not None and source.map is None:
+            raise InputError(f"{option}: {value}; without effect on {source.suite or source.suite_file}; only "
+                             "scenarios on a map are made with it; leave it out, or give --map")  # fmt: skip
     count = "--count" if source.index is None else "--index"
     with options_named(suite="--suite", seed="--seed", count=count, resolution="--resolution"):
         work = _read(source, robot_radius, quiet, progress)
@@ -115,6 +119,10 @@ def _read(source: Source, robot_radius: float, quiet: bool, progress: Progress |
     return Work(make_suite(str(source.suite), source.seed, _count(source), progress))
 
 
+def _obstacles(source: Source) -> dict[str, int | None]:
+    return {"--unknown-obstacles": source.squares, "--movers": source.movers}
+
+
 def _wanted(source: Source) -> int | None:
     return source.count if source.index is None else source.index + 1
 
@@ -141,13 +149,14 @@ def _cut(suite: Suite, source: Source) -> Suite:
 
 
 def _suite_on(path: Path, source: Source, robot_radius: float, quiet: bool, progress: Progress | None) -> Work:
-    for option, value in (("--unknown-obstacles", source.squares), ("--movers", source.movers)):
+    counts = {option: OBSTACLES if value is None else value for option, value in _obstacles(source).items()}
+    for option, value in counts.items():
         if not 0 <= value <= MOST_OBSTACLES:
             raise InputError(f"{option}: {value}; must be from 0 to {MOST_OBSTACLES}; correct it")
     map_file = load_map(path, source.resolution)
     grid = read_grid(map_file, source.unknown, quiet)
-    suite = suite_on_map(path.name, grid, source.seed, _count(source), source.squares, source.movers, robot_radius,
-                         progress)
+    suite = suite_on_map(path.name, grid, source.seed, _count(source), counts["--unknown-obstacles"],
+                         counts["--movers"], robot_radius, progress)
     return Work(suite, map_file.y_down)
 
 

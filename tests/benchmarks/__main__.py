@@ -45,7 +45,7 @@ def main() -> None:
     OUT.mkdir(exist_ok=True)
     keep_compiled()
     if arguments.job:
-        write(job_file(*arguments.job), episodes.job(*arguments.job))
+        write(job_file(*arguments.job), episodes.job(*arguments.job, arguments.time_limit))
         return
     name = f"bench_{arguments.only}" if arguments.only else "bench"
     report = measured([arguments.only] if arguments.only else PARTS)
@@ -58,6 +58,7 @@ def parsed() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m tests.benchmarks", description=__doc__)
     parser.add_argument("--only", choices=PARTS, help="only this part")
     parser.add_argument("--job", nargs=2, type=int, metavar=("W", "S"), help="only a job of so many evaluations")
+    parser.add_argument("--time-limit", type=float, metavar="SECONDS", help="of the job's episodes")
     return parser.parse_args()
 
 

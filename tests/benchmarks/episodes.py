@@ -9,6 +9,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -95,9 +96,14 @@ def candidates(count: int) -> list[Constants]:
     return [replace(BASE.constants, weights=replace(weights, local_heading=float(share))) for share in shares]
 
 
-def job(weights: int, scenarios: int, log: float = 30.0) -> dict[str, Any]:
-    """A tuning job's evaluations on the suite paper-20: wall time, rate as it went, and peak memory of this process."""
+def job(weights: int, scenarios: int, time_limit: float | None = None, log: float = 30.0) -> dict[str, Any]:
+    """A tuning job's evaluations on the suite paper-20: wall time, rate as it went, and peak memory of this process.
+
+    time_limit [s]: of each episode; None: the suite's.
+    """
     worlds = make_suite("paper-20", seed=11, count=scenarios).scenarios
+    if time_limit is not None:
+        worlds = [replace(world, time_limit=np.float32(time_limit)) for world in worlds]
     judge_pairs(worlds[:2], candidates(1), BASE.options)  # compiled before
     begin, seen, shown = time.perf_counter(), [], [0.0]
 
@@ -116,8 +122,12 @@ def job(weights: int, scenarios: int, log: float = 30.0) -> dict[str, Any]:
 
 
 def peak_mebibytes() -> float:
-    """Of this process so far."""
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    """Of this process so far; by `getrusage`, where there is no other way, it may be that of the one that began it."""
+    try:
+        lines = Path("/proc/self/status").read_text().splitlines()
+        return next(float(line.split()[1]) for line in lines if line.startswith("VmHWM")) / 1024
+    except (OSError, StopIteration):
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
 def compile_time() -> dict[str, float]:

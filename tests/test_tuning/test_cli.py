@@ -539,6 +539,7 @@ MISTAKES = {
     "limit of a sheet": (("suite", "show", "some.suite", "--limit", 0), "--limit", "0", "draw at least one"),
     "obstacles": (("evaluate", "--map", "all.png", "--unknown-obstacles", -1), "--unknown-obstacles", "-1", "correct"),
     "movers": (("evaluate", "--map", "all.png", "--movers", 10**9), "--movers", str(10**9), "correct"),
+    "movers without a map": (("evaluate", "--suite", "paper-15", "--movers", 5), "--movers", "5", "or give --map"),
     "unknown robot": ((*EVALUATE, "--robot", "tank"), "--robot", "'tank'", "choose one"),
     "no speed": ((*EVALUATE, "--v-max", 0), "--v-max", "0", "correct it"),
     "too fast": (("ablate", *EVALUATE[1:], "--v-max", 11), "--v-max", "11", "correct it"),
