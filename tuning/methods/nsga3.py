@@ -16,9 +16,12 @@ from pymoo.operators.mutation.pm import PM
 from pymoo.problems.static import StaticProblem
 from pymoo.util.ref_dirs import get_reference_directions
 
+from tuning.hypervolume import margins, reference_point
 from tuning.methods.method import Problem, Search
 from tuning.methods.sobol import sobol_points
-from tuning.objectives import Scores
+from tuning.objectives import Goals, Scores
+
+VIOLATED = 1e6  # more than a candidate of any use is beyond the margins
 
 
 class Settings(BaseModel):
@@ -35,21 +38,30 @@ class Settings(BaseModel):
     mutation_eta: int = Field(10, ge=1, le=100)
     """Index of the polynomial mutation, alike."""
 
+    within_margins: bool = True
+    """Whether to search first where the hypervolume is measured: among candidates no worse than the default constants,
+    by more than its margins, in any objective. False, and where these violate a constraint: along the whole front."""
+
 
 def nsga3(problem: Problem) -> Search:
     """A first generation of the default constants and Sobol points, then each the offspring of all before it.
 
-    What violates a constraint loses to what violates it less, and that to what violates none.
+    What violates a constraint loses to what violates it less, and that to what violates none; of those, what is beyond
+    the margins loses to what is less beyond them, and that to what is within.
     """
     settings = Settings.model_validate(problem.settings)
     population = settings.population or min(max(problem.candidates // 64, 16), 128)
     algorithm = _algorithm(problem, max(population, len(problem.goals.objectives)), settings)
-    left = problem.candidates
+    left, first = problem.candidates, None
     while left > 0 and (asked := algorithm.ask()) is not None:
         scores = yield np.array(asked.get("X"))[:left]
         left -= len(asked)
+        first = first or Scores(scores.objectives[:1], scores.violation[:1])  # of the default constants
         if left > 0:
-            _tell(algorithm, asked, scores)
+            within = settings.within_margins and not first.violation.any()
+            beyond = _beyond_margins(scores, first, problem.goals) if within else np.zeros(len(scores.violation))
+            loss = np.where(scores.violation > 0.0, VIOLATED + scores.violation, beyond)
+            _tell(algorithm, asked, scores.objectives, loss)
 
 
 def _algorithm(problem: Problem, population: int, settings: Settings) -> Algorithm:
@@ -76,8 +88,14 @@ def _directions(objectives: int, most: int) -> np.ndarray:
     return get_reference_directions("das-dennis", objectives, n_partitions=finest)
 
 
-def _tell(algorithm: Algorithm, asked: Population, scores: Scores) -> None:
-    judged = StaticProblem(algorithm.problem, F=scores.objectives, G=scores.violation[:, None])
+def _beyond_margins(scores: Scores, default: Scores, goals: Goals) -> np.ndarray:
+    """[C] by how many margins, over all objectives, candidates are beyond the hypervolume's reference point."""
+    reference, unit = reference_point(goals, default), margins(goals, default)
+    return np.maximum((scores.objectives - reference) / unit, 0.0).sum(axis=1)
+
+
+def _tell(algorithm: Algorithm, asked: Population, objectives: np.ndarray, loss: np.ndarray) -> None:
+    judged = StaticProblem(algorithm.problem, F=objectives, G=loss[:, None])
     Evaluator().eval(judged, asked)
     with warnings.catch_warnings():  # pymoo silences all of them, for good
         algorithm.tell(infills=asked)
