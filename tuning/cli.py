@@ -28,6 +28,7 @@ from scenarios.suite import SUITE_NAMES, Suite, save_suite
 from tuning.compiled import keep_compiled
 from tuning.console import note, plans_table, progress_bar, results_table, show
 from tuning.evaluate import Interrupted, evaluate
+from tuning.interrupts import keep_interrupts
 from tuning.options import (
     MAP_HELP,
     CountOption,
@@ -382,6 +383,7 @@ def demo_command(
 def main() -> None:
     """Entry point: a user's mistake becomes one line and exit code 2, Ctrl-C exit code 130."""
     keep_compiled()
+    keep_interrupts()
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # file names and ω need not be in the terminal's alphabet
             stream.reconfigure(errors="backslashreplace")

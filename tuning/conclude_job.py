@@ -14,6 +14,7 @@ from tuning.job_checks import Setup
 from tuning.job_folder import HELD_OUT, TRAINING, Log, remembered
 from tuning.nav2 import nav2_text
 from tuning.outputs import write_whole
+from tuning.plans_only import known_of_plans
 from tuning.store import Store, as_evaluations
 from tuning.tiled_judge import TiledJudge
 from tuning.weights_file import weights_text
@@ -60,8 +61,12 @@ def recommended_text(setup: Setup, findings: Findings, preset: Preset) -> str:
 
 def success_lines(findings: Findings) -> list[str]:
     """Success of the default and of the recommended constants, with intervals."""
-    return [f"{name}: success {_successes(member)}"
-            for name, member in (("default", findings.default), ("recommended", _recommended(findings)))]  # fmt: skip
+    what = "path found, nothing driven" if known_of_plans(findings.goals) else "success"
+    lines = [f"{name}: {what} {_successes(member)}"
+             for name, member in (("default", findings.default), ("recommended", _recommended(findings)))]  # fmt: skip
+    if not _recommended(findings).training.feasible:
+        lines.append("no candidate holds all constraints on the training scenarios; the recommended comes nearest")
+    return lines
 
 
 def _successes(member: Member) -> str:

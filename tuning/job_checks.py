@@ -14,19 +14,21 @@ from scenarios.errors import InputError
 from scenarios.hiding import hide
 from scenarios.suite import SUITE_NAMES, Suite
 from tuning.choice import mistakes as choice_mistakes
-from tuning.job_file import ConstraintTable, Job, ObjectiveTable, SuiteTable, nearest, placed, refused
+from tuning.job_file import ConstraintTable, Job, ObjectiveTable, PlannerTable, SuiteTable, nearest, placed, refused
 from tuning.objectives import DEFAULT_OBJECTIVES, Constraint, Goals, Statistic
 from tuning.options import Vehicle, configured, reach_of
-from tuning.plans_only import PLANNED
+from tuning.plans_only import PLANNED, known_of_plans
 from tuning.robot_file import SUFFIX
 from tuning.sources import read_suite
 from tuning.space import Parameter, Space, tunable
 from tuning.store import FIGURES, TILE_WIDTH
 from tuning.suite_files import DEFAULT_COUNT
-from tuning.weights_file import COUNTS
+from tuning.weights_file import COUNTS, RULE
 
 MOST = {"success": 1.0, "collision": 1.0, "hit_while_stopped": 1.0, "spl": 1.0, "barn_score": 0.5}
 """Measures that have an upper bound."""
+OF_A_PLAN = (*RULE, "clearance_margin")
+"""Constants that a plan depends on."""
 SIGNED = ("least_clearance", "mean_clearance")  # all others are 0 at least
 Progress = Callable[[int, int], None]
 
@@ -45,9 +47,8 @@ class Setup:
 
     @property
     def plans_only(self) -> bool:
-        """Whether all that matters is known of a plan: then nothing is driven."""
-        statistics = [*self.goals.objectives, *(constraint.statistic for constraint in self.goals.constraints)]
-        return all(statistic.measure in PLANNED for statistic in statistics)
+        """Whether nothing is driven."""
+        return known_of_plans(self.goals)
 
     @property
     def figures(self) -> tuple[str, ...]:
@@ -63,6 +64,8 @@ def mistakes_of(job: Job, folder: Path, wrong: Collection[int | str] = ()) -> li
     checks: tuple[tuple[set[str], Iterable[str]], ...] = (
         ({"objectives"}, _repeated_objectives(job)),
         ({"constraints"}, _impossible_constraints(job)),
+        ({"training"}, _missing_files(job, folder, "training")),
+        ({"held_out"}, _missing_files(job, folder, "held_out")),
         ({"training", "held_out"}, _overlaps(job, folder)),
         ({"training", "method"}, _racing_mistakes(job)),
         ({"planner"}, _parameter_mistakes(job, folder)),
@@ -82,9 +85,8 @@ def remarks_of(space: Space) -> list[str]:
             if np.float32(default) != np.float32(nearest_in)]  # fmt: skip
 
 
-def planner_of(job: Job, folder: Path) -> Preset:
+def planner_of(table: PlannerTable, folder: Path) -> Preset:
     """The planner with its constants as they are before tuning."""
-    table = job.planner
     weights = None if table.weights is None else folder / table.weights
     robot = str(folder / table.robot) if table.robot and table.robot.endswith(SUFFIX) else table.robot
     return configured(table.preset, Vehicle(robot, table.v_max, table.sensor_range), weights)
@@ -108,10 +110,17 @@ def set_up(job: Job, path: Path, folder: Path, quiet: bool, progress: Progress |
     InputError for a suite that cannot be had, for scenarios that are in both, and for a budget below all of training
     twice.
     """
-    config = planner_of(job, folder)
+    config = planner_of(job.planner, folder)
     places = [(f"{table}.suites.{index}", entry) for table in ("training", "held_out")
               for index, entry in enumerate(getattr(job, table).suites)]  # fmt: skip
-    parts = [_part(path, place, entry, folder, config, quiet, progress) for place, entry in places]
+    parts, mistakes = [], []
+    for place, entry in places:
+        try:
+            parts.append(_part(place, entry, folder, config, quiet, progress))
+        except InputError as error:
+            mistakes.append(placed(place, error))
+    if mistakes:
+        raise refused(path, mistakes)
     training = joined([part.suite for part in parts if part.place.startswith("training")])
     held_out = joined([part.suite for part in parts if part.place.startswith("held_out")])
     mistakes = list(_shared(training, held_out))
@@ -145,12 +154,9 @@ class _Part:
     y_down: bool
 
 
-def _part(path: Path, place: str, entry: SuiteTable, folder: Path, config: Preset, quiet: bool,
+def _part(place: str, entry: SuiteTable, folder: Path, config: Preset, quiet: bool,
           progress: Progress | None) -> _Part:
-    try:
-        work = read_suite(entry.source(folder), reach_of(config.constants.robot), quiet, progress)
-    except InputError as error:
-        raise refused(path, [placed(place, error)]) from None
+    work = read_suite(entry.source(folder), reach_of(config.constants.robot), quiet, progress)
     return _Part(place, work.suite, work.y_down)
 
 
@@ -188,28 +194,45 @@ def _impossible_constraints(job: Job) -> Iterator[str]:
                        "asks for; lower it, raise the other, or remove one")  # fmt: skip
 
 
+def _missing_files(job: Job, folder: Path, table: str) -> Iterator[str]:
+    """Suites that are not there: told beside all else, before any is read."""
+    for index, entry in enumerate(getattr(job, table).suites):
+        place = f"{table}.suites.{index}"
+        for key in ("map", "suite_file"):
+            name = getattr(entry, key)
+            if name is not None and not (folder / name).exists():
+                yield f"{place}.{key}: {name}; no such file; check the name and the path"
+        if entry.suite is not None and entry.suite not in SUITE_NAMES and not Path(entry.suite).exists():
+            yield (f"{place}.suite: {entry.suite!r}; must be one of {', '.join(SUITE_NAMES)}; "
+                   f"{nearest(entry.suite, SUITE_NAMES)}")  # fmt: skip
+
+
 def _choice_mistakes(job: Job) -> Iterator[str]:
     yield from choice_mistakes(job.choice, goals_of(job))
 
 
 def _parameter_mistakes(job: Job, folder: Path) -> Iterator[str]:
-    try:
-        config = planner_of(job, folder)
-    except InputError as error:
-        yield placed("planner", error)
+    apart = (job.planner.model_copy(update={"weights": None}), job.planner.model_copy(update={"robot": None}))
+    found = [mistake for table in apart
+             for mistake in _failing("planner", lambda table=table: planner_of(table, folder))]  # fmt: skip
+    found = list(dict.fromkeys(found)) or list(_failing("planner", lambda: planner_of(job.planner, folder)))
+    if found:
+        yield from found
         return
+    config = planner_of(job.planner, folder)
     found = list(_single_mistakes(job, config))
     yield from found or _failing("parameters", lambda: space_of(job, config))
 
 
 def _single_mistakes(job: Job, config: Preset) -> Iterator[str]:
     """Of each parameter by itself."""
-    names = tunable(config.options.rules)
+    names, where = tunable(config.options.rules), f"under preset {job.planner.preset}"
+    if known_of_plans(goals_of(job)):
+        names, where = tuple(name for name in names if name in OF_A_PLAN), "where all that matters is known of a plan"
     for name, table in job.parameters.items():
         place = f"parameters.{name}"
         if name not in names:
-            yield (f"{place}: has no effect under preset {job.planner.preset}; must be one of {', '.join(names)}; "
-                   f"{nearest(name, names)}")  # fmt: skip
+            yield f"{place}: has no effect {where}; must be one of {', '.join(names)}; {nearest(name, names)}"
             continue
         yield from _failing(place, lambda name=name, table=table: Parameter(name, table.low, table.high, table.scale))
         low, high = COUNTS.get(name, (0, table.high))

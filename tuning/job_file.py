@@ -251,8 +251,13 @@ def _sentence(found: Mapping[str, Any], place: tuple[str, ...], known: tuple[str
         return f"{where}: unknown key; the keys are {', '.join(names)}; {nearest(str(found['loc'][-1]), names)}"
     if kind == "value_error":  # ours
         return placed(where, found["ctx"]["error"])
-    rule, remedy = OF_TYPE.get(kind, (found["msg"].removeprefix("Input should be "), "correct it"))
+    rule, remedy = OF_TYPE.get(kind, (_rule_of(found["msg"]), "correct it"))
     return f"{where}: {value}; must be {rule[:1].lower()}{rule[1:]}; {remedy}"
+
+
+def _rule_of(message: str) -> str:
+    """What pydantic asks for, to follow "must"."""
+    return message.removeprefix("Input should be ").replace("String should have", "a text of")
 
 
 def _names_at(place: tuple[str | int, ...]) -> tuple[str, ...]:

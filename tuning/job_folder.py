@@ -95,16 +95,20 @@ def begin(folder: Path, job: Path, seed: int, inputs: Mapping[str, str]) -> None
 
 def environment_of(folder: Path) -> dict[str, Any]:
     """That in which the job began. InputError where there is no job."""
+    if not (folder / JOB).exists():
+        lost = (folder / LOG).exists()  # of a job that had begun
+        raise InputError(f"{folder}: {JOB} is missing; a job cannot go on without it; put the job's file back" if lost
+                         else f"{folder}: no job; must be the folder of a job that has begun; name one, or begin: "
+                         "adwa tune run JOB --out DIR")  # fmt: skip
     try:
-        if not (folder / JOB).exists():
-            raise FileNotFoundError(JOB)
         environment = json.loads((folder / ENVIRONMENT).read_text(encoding="utf-8"))
         if not isinstance(environment, dict) or not {"versions", "job_file", "inputs"} <= set(environment):
             raise ValueError(f"{ENVIRONMENT} is damaged")
         return environment
     except (OSError, ValueError) as error:
-        raise InputError(f"{folder}: no job ({' '.join(str(error).split())}); must be the folder of a job that has "
-                         "begun; name one, or begin: adwa tune run JOB --out DIR") from None  # fmt: skip
+        raise InputError(f"{folder / ENVIRONMENT}: damaged or missing ({' '.join(str(error).split())}); it says what "
+                         f"the job began with; restore it, or run the job anew: adwa tune run {folder / JOB} --out DIR"
+                         ) from None  # fmt: skip
 
 
 def home_of(environment: Mapping[str, Any]) -> Path:

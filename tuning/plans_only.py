@@ -16,12 +16,19 @@ from adwa_jax.episode import Outcome
 from adwa_jax.scenario import Scenario
 from tuning.compiled import keep_compiled
 from tuning.engine import Judged, Program, Progress, Table, in_threads, pairs_by_program, usable_cores
+from tuning.objectives import Goals
 from tuning.plans_ahead import Pair, Planned, Planner
 
 PLANNED = ("optimal_length", "planned_length", "planned_length_ratio", "key_point_length", "key_point_count",
            "expansions", "planned_breaking_points", "planned_danger_points", "planned_key_point_breaking_points",
            "planned_key_point_danger_points")  # fmt: skip
 """Measures of the planned path: nothing need be driven for them."""
+
+
+def known_of_plans(goals: Goals) -> bool:
+    """Whether all that matters is known of a plan: then nothing is driven."""
+    statistics = [*goals.objectives, *(constraint.statistic for constraint in goals.constraints)]
+    return all(statistic.measure in PLANNED for statistic in statistics)
 
 
 def judge_plans(scenarios: Sequence[Scenario], candidates: Sequence[Constants], options: Options,

@@ -268,7 +268,8 @@ def optimism_figure(findings: Findings) -> "Figure":
         _draw_against([best], index, statistic, ax, CHOSEN | {"label": findings.picked})
         ends = np.array([*ax.get_xlim(), *ax.get_ylim()])
         ax.axline((ends.min(), ends.min()), slope=1.0, color=GREY, linestyle="--", linewidth=1.0, zorder=0)
-        _label_axes(ax, f"training: {axis_label(statistic)}", f"held-out: {name_and_unit(statistic)}")
+        _label_axes(ax, f"training: {name_and_unit(statistic)}", f"held-out: {name_and_unit(statistic)}")
+        ax.set_title(axis_label(statistic).rpartition(", ")[2], fontsize="medium")
     figure_legend(figure, panels)
     return figure
 

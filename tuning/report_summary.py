@@ -10,6 +10,7 @@ from tuning.evaluations import Evaluations
 from tuning.figures import SENTENCES
 from tuning.findings import Choice, Comparison, Findings, Interval, Judgement, Member
 from tuning.objectives import RATES, Statistic
+from tuning.plans_only import known_of_plans
 from tuning.report_figures import in_units, measure_name, name_and_unit, recommended, unit_of
 from tuning.report_html import table
 
@@ -57,7 +58,7 @@ def honest_reading(findings: Findings) -> str:
         sentences.append(_gap_sentence(best.training, best.held_out))
     if findings.compared is not None:
         sentences.append("Some member of the front beats the default constants in every objective on the held-out "
-                         "scenarios, by its point estimates." if findings.compared.better_on_all
+                         "scenarios that both solve, by its point estimates." if findings.compared.better_on_all
                          else f"No member of the front beats the default constants in every objective on the held-out "
                          f"scenarios. {findings.compared.why_not}".rstrip())  # fmt: skip
     if not best.training.feasible:
@@ -71,11 +72,19 @@ def what_was_tuned(fields: Mapping[str, Any], findings: Findings, training: Eval
     robot = f" on the robot {planner['robot']}" if planner.get("robot") else ""
     held_out = fields.get("held_out")
     unseen = f"held out: {suites_sentence(held_out)}" if held_out else "nothing was held out"
-    racing = ", candidates that were clearly worse dropped early" if method.get("racing") else ""
-    return (f"{len(findings.parameters)} constants of the {planner.get('preset', '')} planner{robot} were tuned: "
-            f"{', '.join(findings.parameters)}. The method {method.get('name', '')} tried {len(training.values) - 1} "
-            f"sets of constants in {int(training.done.sum())} episodes{racing}. Training: "
+    dropped = int((~training.complete).sum())
+    racing = f", of which {dropped} were clearly worse and dropped early" if method.get("racing") and dropped else ""
+    driven = "; nothing was driven, as all that matters here is known of a plan" * known_of_plans(findings.goals)
+    tuned = f"{counted(len(findings.parameters), 'constant')} of the {planner.get('preset', '')} planner{robot}"
+    return (f"{tuned} {'was' if len(findings.parameters) == 1 else 'were'} tuned: {', '.join(findings.parameters)}. "
+            f"The method {method.get('name', '')} tried {len(training.values) - 1} sets of constants in "
+            f"{int(training.done.sum())} episodes{racing}{driven}. Training: "
             f"{suites_sentence(fields.get('training') or {})}; {unseen}.")  # fmt: skip
+
+
+def counted(count: int, noun: str) -> str:
+    """A number of things."""
+    return f"{count} {noun}{'s' * (count != 1)}"
 
 
 def suites_sentence(part: Mapping[str, Any]) -> str:
@@ -98,7 +107,8 @@ def success_table(findings: Findings) -> str:
         change = NONE if told is None else shown_difference(SUCCESS, told.success)
         rows.append(("held out", str(best.held_out.scenarios), shown(SUCCESS, default.held_out.success),
                      shown(SUCCESS, best.held_out.success), change))  # fmt: skip
-    return table("Success, with 95 % Wilson intervals; the change is paired, in percentage points",
+    title = "Paths found; nothing was driven" if known_of_plans(findings.goals) else "Success"
+    return table(f"{title}, with 95 % Wilson intervals; the change is paired, in percentage points",
                  ("suite", "scenarios", "before: default", f"after: {findings.picked}", "change"), rows)  # fmt: skip
 
 
@@ -124,7 +134,8 @@ def objectives_table(findings: Findings) -> str:
             cells += [shown_difference(statistic, difference), reading(statistic, difference)]
         better = "less" if statistic.direction == "min" else "more"
         rows.append((f"{measure_name(statistic)} ({better} is better)", *cells))
-    return table("Objectives, with 95 % intervals, each by itself; the change is paired, on held-out scenarios",
+    return table("Objectives, with 95 % intervals, each by itself; the change is paired, on held-out scenarios (where "
+                 "a figure is of solved ones, on those that both solve)",
                  ("objective", "training: default", f"training: {findings.picked}", "held out: default",
                   f"held out: {findings.picked}", "change", "reading"), rows)  # fmt: skip
 
@@ -158,7 +169,8 @@ def outcomes_table(findings: Findings, held_out: Evaluations, held_out_rows: np.
              if member.row in held_out_rows]  # fmt: skip
     if len(ended) < len(members):
         return ""
-    rows = [(SENTENCES[outcome], *(str(int((found == outcome).sum())) for found in ended)) for outcome in Outcome
+    sentences = {**SENTENCES, Outcome.REACHED: "a path was found"} if known_of_plans(findings.goals) else SENTENCES
+    rows = [(sentences[outcome], *(str(int((found == outcome).sum())) for found in ended)) for outcome in Outcome
             if any((found == outcome).any() for found in ended)]  # fmt: skip
     return table("How the held-out scenarios ended", ("outcome", *members), rows)
 

@@ -16,6 +16,7 @@ from scenarios.formats.reading import bad_input, positive_number, read_bytes
 IMAGE_SUFFIXES = (".png", ".pgm", ".ppm", ".pbm", ".pnm", ".jpg", ".jpeg", ".bmp", ".gif", ".tif", ".tiff",
                   ".webp")
 LARGEST_CELLS = 8192 * 8192
+FINEST, COARSEST = 0.001, 100.0  # [m], side of a pixel
 
 _DEEP_LAYOUT = re.compile(r"(L|LA|RGB|RGBA|RGBX|I);16")
 
@@ -51,6 +52,9 @@ def load_image_map(path: str | Path, resolution: float = 1.0) -> MapFile:
     guessed) and for files that Pillow cannot read.
     """
     positive_number("resolution", resolution, "give the side of a pixel in metres")
+    if not FINEST <= resolution <= COARSEST:
+        raise bad_input("resolution", f"{resolution:g}", f"must be from {FINEST:g} to {COARSEST:g} m",
+                        "give the side of a pixel in metres")
     pixels = read_pixels(path)
     if pixels.alpha is not None and (pixels.alpha < 255).any():
         count = int((pixels.alpha < 255).sum())

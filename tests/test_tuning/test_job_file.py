@@ -65,7 +65,7 @@ def told(path):
 def test_a_job_says_planner_space_goals_and_suites(written):
     path = written()
     job = load_job(path)
-    config = planner_of(job, path.parent)
+    config = planner_of(job.planner, path.parent)
     assert config == extended()
     assert space_of(job, config).names == ("clearance",)
     goals = goals_of(job)
@@ -85,7 +85,7 @@ def test_several_suites_are_taken_together_under_different_names(written, tmp_pa
 def test_a_robots_file_lies_relative_to_the_job(written, tmp_path):
     (tmp_path / "small.toml").write_text("radius = 0.2\nv_max = 0.6\n")
     path = written(('preset = "extended"', 'preset = "extended"\nrobot = "small.toml"'))
-    robot = planner_of(load_job(path), tmp_path).constants.robot
+    robot = planner_of(load_job(path).planner, tmp_path).constants.robot
     assert robot == replace(extended().constants.robot, radius=0.2, v_max=0.6)
 
 

@@ -77,20 +77,24 @@ def gradient(problem: Problem) -> Search:
     `hard` [B, D] (gradients in the unit cube of what is minimised), `sign_agreement` [B, D] (share of the resamples),
     `informed` [D] (whether the surrogate has a gradient there, over which the cosine is), `weights` [B, O], and
     `cosine`, `cosine_low`, `cosine_high` [B] (95 % over resamples of the scenarios). Raises InputError if no parameter
-    has a gradient.
+    has a gradient, or the budget pays for no round.
     """
     settings = Settings(**problem.settings)
     free = np.array([name not in COUNTS for name in problem.space.names])
     if not free.any():
         raise InputError("method.name: 'gradient'; integer parameters have no gradient; tune another constant as "
                          "well, or choose another method")  # fmt: skip
+    needed = settings.starts + _cost(settings, 0)
+    if problem.candidates < needed:
+        raise InputError(f"method.episodes: pays for {problem.candidates} candidates; {settings.starts} starts and "
+                         f"a first round need {needed}; raise it, or take fewer starts or es_pairs")  # fmt: skip
     points, weights = starts_of(problem, settings, free)
     scores = yield points
     scaling = scaling_of(scores)
     best = _each(scaling, scores, weights, 1)[:, 0]
     reach = np.full(len(points), settings.reach * np.sqrt(free.sum()))
     spent, number = len(points), 0
-    while number == 0 or spent + _cost(settings, number) <= problem.candidates:
+    while spent + _cost(settings, number) <= problem.candidates:
         hard = np.zeros_like(points)
         if number == 0 or settings.trust != "surrogate":
             probes = [probes_about(point, free, settings.es_pairs, settings.es_scale,
