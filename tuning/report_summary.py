@@ -29,13 +29,13 @@ def verdict(findings: Findings) -> str:
     for statistic, difference in _differences(findings, compared):
         kinds[reading(statistic, difference)].append(measure_name(statistic))
     better, worse = (" and ".join(kinds[kind]) for kind in ("better", "worse"))
-    on = f"on {best.held_out.scenarios} scenarios that the search never saw"
+    on, these = f"on {best.held_out.scenarios} scenarios that the search never saw", f"the {findings.picked} constants"
     if better and not worse:
-        return f"Yes: {on}, the recommended constants are better in {better}; in nothing are they worse beyond chance."
+        return f"Yes: {on}, {these} are better in {better}; in nothing are they worse beyond chance."
     if better:
-        return f"In part: {on}, the recommended constants are better in {better} and worse in {worse}."
+        return f"In part: {on}, {these} are better in {better} and worse in {worse}."
     if worse:
-        return f"No: {on}, the recommended constants are worse in {worse} and better in nothing beyond chance."
+        return f"No: {on}, {these} are worse in {worse} and better in nothing beyond chance."
     return f"Not shown: {on}, no objective differs beyond chance from that of the default constants."
 
 

@@ -1,7 +1,7 @@
 """Where a command's work comes from: queries on a map, and suites from their options."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -157,7 +157,19 @@ def _suite_on(path: Path, source: Source, robot_radius: float, quiet: bool, prog
     grid = read_grid(map_file, source.unknown, quiet)
     suite = suite_on_map(path.name, grid, source.seed, _count(source), counts["--unknown-obstacles"],
                          counts["--movers"], robot_radius, progress)
+    if not quiet:
+        _tell_of_fewer(suite, counts)
     return Work(suite, map_file.y_down)
+
+
+def _tell_of_fewer(suite: Suite, counts: Mapping[str, int]) -> None:
+    """Obstacles that found no place: where there are no movers, nothing can be learnt about movers."""
+    kinds = [(scenario.squares.valid, scenario.movers.valid) for scenario in suite.scenarios]
+    for (option, count), placed in zip(counts.items(), zip(*kinds, strict=True), strict=True):
+        found = np.array([np.sum(valid) for valid in placed])
+        if (found < count).any():
+            note(f"{suite.name}: {option} {count} found no place in {np.mean(found < count):.0%} of scenarios; on "
+                 f"average {found.mean():.1f} are there")  # fmt: skip
 
 
 def _listed_queries(map_file: MapFile, scen: Path, limit: int | None, quiet: bool) -> Queries:

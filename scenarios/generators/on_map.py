@@ -64,10 +64,13 @@ def prepare(grid: Grid, robot_radius: float, name: str = "map") -> Ground:
 
 
 def spec_for(ground: Ground, squares: int, movers: int, robot_radius: float) -> OnMapSpec:
-    """The spec with time limit and mover distance in keeping with the map's size."""
+    """The spec with a time limit in keeping with the map's size, and a mover distance with where a robot can get: the
+    map may have a margin far wider, in which nothing moves.
+    """
     diagonal = math.hypot(*ground.blocked.shape) * ground.resolution
+    reach = math.hypot(*(np.ptp(ground.reachable, axis=0) + 1)) * ground.resolution
     return OnMapSpec(robot_radius=robot_radius, squares=squares, movers=movers,
-                     time_limit=max(60.0, SECONDS_PER_METRE * diagonal), mover_distance=min(4.0, diagonal / 6))
+                     time_limit=max(60.0, SECONDS_PER_METRE * diagonal), mover_distance=min(4.0, reach / 6))
 
 
 def generate(key: jax.Array, spec: OnMapSpec, ground: Ground) -> Scenario:

@@ -540,6 +540,15 @@ def test_tasks_on_a_map_lie_far_apart_in_its_largest_part(seed):
     assert min(scenario.start[0], scenario.goal[0]) > -2.0 + 13 * 0.25
 
 
+def test_movers_find_a_place_in_a_small_room_on_a_large_map():
+    occupied = np.ones((150, 150), np.bool_)
+    occupied[60:90, 60:90] = False  # 6 m a side
+    ground = on_map.prepare(grid_of(occupied, 0.2), 0.2)
+    spec = on_map.spec_for(ground, squares=0, movers=3, robot_radius=0.2)
+    for seed in range(5):
+        assert on_map.generate(jax.random.key(seed), spec, ground).movers.valid.sum() == 3
+
+
 def test_a_map_too_small_for_a_third_of_its_diagonal_takes_the_farthest_goal():
     occupied = np.ones((30, 30), np.bool_)
     occupied[5, 5:8] = False

@@ -4,6 +4,7 @@ import re
 from dataclasses import replace
 
 import pytest
+from PIL import Image
 
 from adwa_jax.presets import extended
 from scenarios.errors import InputError
@@ -219,9 +220,40 @@ def test_the_same_scenarios_by_another_name_are_refused(written, tmp_path, sense
         set_up(load_job(path), path, tmp_path, quiet=True)
 
 
-@pytest.mark.parametrize(("suite", "told"), [('map = "gone.map"', r"held_out\.suites\.0: .*gone.map: no such file"),
-                                             ('suite = "paper-99"', r"held_out\.suites\.0\.suite: 'paper-99'; ")])
-def test_a_suite_that_cannot_be_had_is_named_by_its_place(written, tmp_path, suite, told):
-    path = written(('suite = "paper-15", count = 2', f"{suite}, count = 2"))
-    with pytest.raises(InputError, match=told):
+def test_all_files_that_are_not_there_are_listed_together(written):
+    suites = '{suite = "papr-15"}, {suite_file = "gone.npz"}'
+    lines = told(written(('suite = "paper-15", count = 2', 'map = "gone.map", count = 2'),
+                         ('{suite = "paper-15", count = 3, seed = 1}', suites),
+                         ('preset = "extended"', 'preset = "extended"\nrobot = "r.toml"\nweights = "w.toml"')))
+    assert [re.sub(r"/\S*/", "", line) for line in lines] == [
+        "training.suites.0.suite: 'papr-15'; must be one of paper-15, paper-20, paper-25, blocks, rooms, maze, barn, "
+        "crowd; did you mean paper-15?",
+        "training.suites.1.suite_file: gone.npz; no such file; check the name and the path",
+        "held_out.suites.0.map: gone.map; no such file; check the name and the path",
+        "planner: r.toml: no such file; a file of robot limits (TOML) is expected; check the name and folder",
+        "planner: w.toml: no such file; a file of weights (TOML) is expected; check the name and folder",
+    ]  # fmt: skip
+
+
+def test_suites_that_cannot_be_read_are_all_named_by_their_places(written, tmp_path):
+    for name in ("a.map", "b.map"):
+        (tmp_path / name).write_text("no map")
+    path = written(('suite = "paper-15", count = 3', 'map = "a.map", count = 3'),
+                   ('suite = "paper-15", count = 2', 'map = "b.map", count = 2'))
+    with pytest.raises(InputError, match=r"training\.suites\.0: .*a\.map.*\n.*held_out\.suites\.0: .*b\.map"):
+        set_up(load_job(path), path, tmp_path, quiet=True)
+
+
+def test_constants_that_no_plan_depends_on_are_refused_where_only_plans_matter(written):
+    objectives = '[[objectives]]\nmeasure = "expansions"\ndirection = "min"\n\n[method]'
+    (line,) = told(written(("[method]", objectives), ('measure = "success"\nat_least = 0.95',
+                                                      'measure = "expansions"\nat_most = 900.0')))
+    assert line.startswith("parameters.clearance: has no effect where all that matters is known of a plan; must be ")
+
+
+@pytest.mark.parametrize("side", [1e-30, 1e30])
+def test_a_pixel_of_no_sensible_size_is_refused(written, tmp_path, side):
+    Image.new("L", (20, 20), 255).save(tmp_path / "a.png")
+    path = written(('suite = "paper-15", count = 3', f'map = "a.png", resolution = {side}, count = 3'))
+    with pytest.raises(InputError, match=r"training\.suites\.0\.resolution: 1e.*; must be from 0\.001 to 100 m"):
         set_up(load_job(path), path, tmp_path, quiet=True)

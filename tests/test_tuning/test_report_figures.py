@@ -176,7 +176,8 @@ def test_optimism_shows_training_against_held_out():
     figure = optimism_figure(found)
     assert len(figure.axes) == 4
     success = figure.axes[0]
-    assert success.get_xlabel() == "training: success rate [%], more is better"
+    assert success.get_xlabel() == "training: success rate [%]"
+    assert success.get_title() == "more is better"
     containers = {container.get_label(): container for container in success.containers}
     default = found.default
     np.testing.assert_allclose(

@@ -5,8 +5,9 @@ import pytest
 
 from tests.test_tuning.findings_by_hand import evaluations, findings, job
 from tuning.analysis import chosen_by_hand
-from tuning.findings import Comparison, Interval
-from tuning.objectives import Statistic
+from tuning.conclude_job import success_lines
+from tuning.findings import BY_HAND, Choice, Comparison, Interval
+from tuning.objectives import Goals, Statistic
 from tuning.report_summary import (
     SUCCESS,
     choices_table,
@@ -49,6 +50,36 @@ def test_the_verdict_says_yes_in_part_no_or_not_shown():
     assert verdict(compared(SAME, MORE, SAME, SAME)).startswith("No:")
     assert verdict(compared(SAME, SAME, SAME, SAME)).startswith("Not shown:")
     assert verdict(findings(held_out=False)).startswith("Not known:")
+
+
+def test_the_verdict_on_a_choice_by_hand_does_not_call_it_recommended():
+    found = compared(SAME, LESS, SAME, SAME)
+    by_hand = replace(found, choices=(Choice(BY_HAND, 1, np.full(3, np.nan), "yours"),), recommended=0)
+    assert "the chosen constants are better in length ratio; in nothing" in verdict(by_hand)
+    assert "recommended" not in verdict(by_hand)
+
+
+def test_success_is_that_of_plans_where_nothing_was_driven():
+    found = findings()
+    planned = replace(found, goals=Goals((Statistic("expansions", "min"),)))
+    assert success_lines(found)[0].startswith("default: success training")
+    assert success_lines(planned)[0].startswith("default: path found, nothing driven training")
+    assert "Paths found; nothing was driven" in success_table(planned)
+
+
+def test_what_violates_a_constraint_is_recommended_with_a_word_about_it():
+    found = findings()
+    violating = tuple(replace(member, training=replace(member.training, feasible=False)) for member in found.front)
+    assert "no candidate holds all constraints" in success_lines(replace(found, front=violating))[-1]
+    assert not any("no candidate" in line for line in success_lines(found))
+
+
+def test_a_race_that_dropped_none_is_not_said_to_have():
+    fields = {"method": {"name": "sobol", "racing": True}}
+    assert "dropped early" not in what_was_tuned(fields, findings(), evaluations(last_half_done=False))
+    cut = evaluations()
+    cut.done[2, -1] = False  # beside the last, which was dropped half way
+    assert "of which 2 were clearly worse and dropped early" in what_was_tuned(fields, findings(), cut)
 
 
 def test_the_verdict_looks_at_success_even_where_it_is_no_objective():

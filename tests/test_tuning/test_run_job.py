@@ -233,7 +233,7 @@ class TestRefusals:
             read_setup(file, tmp_path, quiet=True)
 
     def test_a_folder_without_a_job_cannot_go_on(self, tmp_path):
-        with pytest.raises(InputError, match=r"no job \(job.toml\)"):
+        with pytest.raises(InputError, match="no job; must be the folder of a job that has begun"):
             resume_job(tmp_path, quiet=True)
 
     def test_a_full_disk_is_one_line_and_nothing_is_lost(self, whole, file, tmp_path, monkeypatch):

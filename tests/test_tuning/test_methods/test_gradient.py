@@ -33,6 +33,11 @@ def problem(remember=computed_anew, candidates=2 + 2 * ROUND, **settings):
     return Problem(SPACE, GOALS, 7, candidates, SUITE, {**SETTINGS, **settings}, remember)
 
 
+def test_a_budget_that_pays_for_no_round_is_refused():
+    with pytest.raises(InputError, match=f"pays for {1 + ROUND} candidates; 2 starts and a .* need {2 + ROUND}; raise"):
+        next(gradient(problem(candidates=1 + ROUND)))
+
+
 def bowl(points):
     """Both objectives are least at (0.7, 0.2)."""
     apart = (points[:, 0] - 0.7) ** 2 + (points[:, 1] - 0.2) ** 2
