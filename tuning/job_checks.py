@@ -216,12 +216,13 @@ def _parameter_mistakes(job: Job, folder: Path) -> Iterator[str]:
     found = [mistake for table in apart
              for mistake in _failing("planner", lambda table=table: planner_of(table, folder))]  # fmt: skip
     found = list(dict.fromkeys(found)) or list(_failing("planner", lambda: planner_of(job.planner, folder)))
-    if found:
-        yield from found
-        return
-    config = planner_of(job.planner, folder)
-    found = list(_single_mistakes(job, config))
-    yield from found or _failing("parameters", lambda: space_of(job, config))
+    yield from found
+    alone: dict[str, None] = dict.fromkeys(["robot", "v_max", "sensor_range", "weights"])
+    config = planner_of(job.planner.model_copy(update=alone) if found else job.planner, folder)
+    single = list(_single_mistakes(job, config))
+    yield from single
+    if not found and not single:
+        yield from _failing("parameters", lambda: space_of(job, config))
 
 
 def _single_mistakes(job: Job, config: Preset) -> Iterator[str]:

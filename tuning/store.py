@@ -11,7 +11,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from itertools import groupby, product
 from pathlib import Path
-from shutil import rmtree
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -37,6 +36,7 @@ FIGURES: dict[str, type] = {
                  "hit_while_stopped", "brakings", "replans", *Measures._fields)
 }  # fmt: skip
 TILE_WIDTH = 64  # scenarios of a tile: seconds of work, and a file of a few kilobytes
+SUITES = ("training", "held_out")  # of a job
 MARK = 1 << 32  # beside the checksum, so that a mark is never 0
 
 
@@ -96,7 +96,7 @@ class Store:
 
     def _opened(self) -> dict[str, Any]:
         try:
-            if not (self.path / "zarr.json").exists():
+            if not self.path.exists():
                 _make(self.path, self._attributes, len(self.tiles), self.width)
             group = zarr.open_group(self.path, mode="r+")
             arrays = {name: group[name] for name in ("figures", "done", "values", "generation")}
@@ -127,6 +127,8 @@ def open_evaluations(folder: str | Path, suite: str = "training") -> "xarray.Dat
     """
     import xarray
 
+    if suite not in SUITES:
+        raise InputError(f"suite: {suite!r}; a job has the parts {' and '.join(SUITES)}; name one of them")
     found, names = read_store(Path(folder) / f"{suite}.zarr")
     dimensions = ("candidate", "scenario")
     variables: dict[str, Any] = {name: (dimensions, _masked(values, found.done), {"units": UNITS.get(name, "")})
@@ -192,7 +194,6 @@ def _make(path: Path, attributes: Mapping[str, Any], tiles: int, width: int) -> 
     array("done", "uint64", 0, (tiles,), (tiles,), "tile")
     array("values", "float64", np.nan, (parameters,), (parameters,), "parameter")
     array("generation", "int32", -1, (), ())
-    rmtree(path, ignore_errors=True)  # no store: it has no description
     unfinished.rename(path)
 
 

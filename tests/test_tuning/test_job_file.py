@@ -223,7 +223,7 @@ def test_the_same_scenarios_by_another_name_are_refused(written, tmp_path, sense
 def test_all_files_that_are_not_there_are_listed_together(written):
     suites = '{suite = "papr-15"}, {suite_file = "gone.npz"}'
     lines = told(written(('suite = "paper-15", count = 2', 'map = "gone.map", count = 2'),
-                         ('{suite = "paper-15", count = 3, seed = 1}', suites),
+                         ('{suite = "paper-15", count = 3, seed = 1}', suites), ("low = 0.02", "low = 0.9"),
                          ('preset = "extended"', 'preset = "extended"\nrobot = "r.toml"\nweights = "w.toml"')))
     assert [re.sub(r"/\S*/", "", line) for line in lines] == [
         "training.suites.0.suite: 'papr-15'; must be one of paper-15, paper-20, paper-25, blocks, rooms, maze, barn, "
@@ -232,6 +232,7 @@ def test_all_files_that_are_not_there_are_listed_together(written):
         "held_out.suites.0.map: gone.map; no such file; check the name and the path",
         "planner: r.toml: no such file; a file of robot limits (TOML) is expected; check the name and folder",
         "planner: w.toml: no such file; a file of weights (TOML) is expected; check the name and folder",
+        "parameters.clearance: low, high: 0.9, 0.5; must be 0 ≤ low < high ≤ 1e+06; correct them",
     ]  # fmt: skip
 
 
