@@ -7,7 +7,7 @@ from pathlib import Path
 import nbformat
 import pytest
 from nbclient import NotebookClient
-from nbclient.exceptions import CellExecutionError
+from nbclient.exceptions import CellExecutionError, CellTimeoutError, DeadKernelError
 
 FOLDER = Path(__file__).resolve().parents[1] / "notebooks"
 NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
@@ -28,17 +28,24 @@ def quick(monkeypatch):
 
 
 def executed(notebook, name, seconds=SECONDS):
-    """The notebook with its outputs; a cell that fails, fails the test under the notebook's and its own name."""
-    resources = {"metadata": {"path": str(FOLDER)}}
-    client = NotebookClient(notebook, timeout=seconds, kernel_name="python3", resources=resources)
+    """The notebook with its outputs; a cell that fails, takes longer or kills its kernel, fails the test under the
+    notebook's and its own name.
+    """
+    resources, begun = {"metadata": {"path": str(FOLDER)}}, []
+    client = NotebookClient(notebook, timeout=seconds, kernel_name="python3", resources=resources,
+                            on_cell_execute=lambda cell, cell_index: begun.append((cell_index + 1, cell.id)))
     failure = None
     try:
         client.execute()
     except CellExecutionError as error:
-        failure = error
+        failure = f"{error.ename}: {error.evalue}"
+    except CellTimeoutError:
+        failure = f"did not end within {seconds} s"
+    except DeadKernelError:
+        failure = "its kernel died"
     if failure is not None:
-        cell = next(cell for cell in notebook.cells if any(made.output_type == "error" for made in outputs_of(cell)))
-        pytest.fail(f"{name}, cell {notebook.cells.index(cell) + 1} ({cell.id}): {failure.ename}: {failure.evalue}")
+        number, cell = begun[-1]
+        pytest.fail(f"{name}, cell {number} ({cell}): {failure}")
     return notebook
 
 
@@ -86,7 +93,13 @@ def test_a_notebook_runs_and_makes_pictures(path):
             assert made.get("name") != "stderr", f"{path.stem}, cell {cell.id}: {made.text}"
 
 
-def test_a_cell_that_fails_names_its_notebook_and_itself():
-    cells = [nbformat.v4.new_markdown_cell("Why?", id="text"), nbformat.v4.new_code_cell("1 / 0", id="division")]
-    with pytest.raises(pytest.fail.Exception, match=r"some_name, cell 2 \(division\): ZeroDivisionError"):
-        executed(nbformat.v4.new_notebook(cells=cells), "some_name", seconds=60)
+@pytest.mark.parametrize(("source", "seconds", "failure"), [
+    ("1 / 0", 60, "ZeroDivisionError"),
+    ("import time; time.sleep(60)", 5, "did not end within 5 s"),
+    ("import os; os._exit(1)", 60, "its kernel died"),
+])  # fmt: skip
+def test_a_cell_that_fails_names_its_notebook_and_itself(source, seconds, failure):
+    cells = [nbformat.v4.new_markdown_cell("Why?", id="text"), nbformat.v4.new_code_cell("1", id="before"),
+             nbformat.v4.new_code_cell(source, id="culprit"), nbformat.v4.new_code_cell("1", id="after")]  # fmt: skip
+    with pytest.raises(pytest.fail.Exception, match=rf"^some_name, cell 3 \(culprit\): {failure}"):
+        executed(nbformat.v4.new_notebook(cells=cells), "some_name", seconds)
