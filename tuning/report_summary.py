@@ -50,7 +50,7 @@ def honest_reading(findings: Findings) -> str:
     """How far the figures can be trusted: optimism gap, stability, and whether anything beats the default in all."""
     best, choice = recommended(findings), findings.choices[findings.recommended]
     sentences = [
-        f"The recommended constants were picked by the rule “{choice.rule}”: {choice.reason}",
+        f"The {findings.picked} constants were picked by the rule “{choice.rule}”: {choice.reason}",
         f"Had other scenarios of the kind been drawn, the rule would have picked the same in {_stable(choice)} of "
         f"cases, and no candidate would have been better in everything in {best.non_dominated:.0%}.",
     ]
@@ -62,7 +62,7 @@ def honest_reading(findings: Findings) -> str:
                          else f"No member of the front beats the default constants in every objective on the held-out "
                          f"scenarios. {findings.compared.why_not}".rstrip())  # fmt: skip
     if not best.training.feasible:
-        sentences.append("On the training scenarios the recommended constants violate a constraint of the job.")
+        sentences.append(f"On the training scenarios the {findings.picked} constants violate a constraint of the job.")
     return " ".join(sentences)
 
 
