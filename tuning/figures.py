@@ -180,8 +180,8 @@ def compare_drives(drives: Mapping[str, "Replay"], y_down: bool = False) -> "Fig
 
 def outcome_figure(results: Mapping[str, "Results"], ax: "Axes | None" = None) -> "Figure":
     """How the scenarios ended, a bar a planner; its success with the 95 % Wilson interval stands behind its name."""
-    if ax is None:
-        ax = new_figure((8.2, 0.5 * len(results) + 1.5)).subplots()
+    alone = ax is None
+    ax = new_figure((8.2, 0.5 * len(results) + 1.5)).subplots() if ax is None else ax
     left = np.zeros(len(results))
     for outcome, (colour, hatch) in OUTCOME_STYLES.items():
         share = np.array([100 * np.mean(found.outcome == outcome) for found in results.values()])
@@ -194,7 +194,7 @@ def outcome_figure(results: Mapping[str, "Results"], ax: "Axes | None" = None) -
     ax.set(xlim=(0, 100))
     ax.set_xlabel("scenarios [%]", fontsize=FONT)
     ax.tick_params(labelsize=FONT - 1)
-    figure_legend(figure_of(ax), [ax])
+    legend_of(ax, alone)
     return figure_of(ax)
 
 
@@ -204,8 +204,8 @@ def success_figure(rates: Mapping[str, tuple[int, int]], paper: float | None = P
 
     rates: name -> (successes, scenarios).
     """
-    if ax is None:
-        ax = new_figure((1.1 * len(rates) + 1.9, 3.2)).subplots()
+    alone = ax is None
+    ax = new_figure((1.1 * len(rates) + 1.9, 3.2)).subplots() if ax is None else ax
     place = np.arange(len(rates))
     share = np.array([successes / max(count, 1) for successes, count in rates.values()])
     low, high = np.array([wilson(successes, count) for successes, count in rates.values()]).T
@@ -222,7 +222,7 @@ def success_figure(rates: Mapping[str, tuple[int, int]], paper: float | None = P
     ax.set_ylabel("success rate [%], 95 % interval", fontsize=FONT)
     ax.tick_params(labelsize=FONT - 1)
     if paper is not None:
-        figure_legend(figure_of(ax), [ax])
+        legend_of(ax, alone)
     return figure_of(ax)
 
 
@@ -360,6 +360,26 @@ def draw_outline(discs: np.ndarray, radius: float, ax: "Axes", label: str = "rob
     style = {"facecolor": "none", "edgecolor": VERMILLION, "linewidth": 1.2, "zorder": 8.5} | style
     return [ax.add_patch(Circle((x, y), radius, label="_" if index else label, **style))
             for index, (x, y) in enumerate(discs)]  # fmt: skip
+
+
+def legend_of(ax: "Axes", alone: bool) -> None:
+    """One under the figure where the axes stand `alone` in it, else under their own x axis, below its labels."""
+    from matplotlib.transforms import ScaledTranslation
+
+    figure = figure_of(ax)
+    if alone:
+        figure_legend(figure, [ax])
+        return
+    names = [name for name in ax.get_legend_handles_labels()[1] if name]
+    widest = max((len(name) for name in names), default=0)
+    inches = figure.get_figwidth() * ax.get_position().width
+    legend_below(ax, columns=max(1, min(len(names), int(inches / (0.065 * widest + 0.5)))))
+    labels = ax.xaxis.get_tightbbox()
+    down = (ax.bbox.y0 - labels.y0) / figure.dpi if labels else 0.0
+    below = ax.transAxes + ScaledTranslation(0.0, -down - 0.06, figure.dpi_scale_trans)
+    legend = ax.get_legend()
+    if legend:
+        legend.set_bbox_to_anchor((0.5, 0.0), below)
 
 
 def prefixed(title: str) -> str:

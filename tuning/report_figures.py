@@ -27,6 +27,7 @@ from scenarios.drawing import (
 from tuning.analysis import judgements
 from tuning.console import UNITS
 from tuning.evaluations import Evaluations
+from tuning.figures import legend_of
 from tuning.findings import BY_HAND, Findings, HypervolumeCurve, Judgement, Member
 from tuning.objectives import RATES, Goals, Statistic, estimate
 from tuning.weights_file import UNITS as CONSTANT_UNITS
@@ -133,8 +134,8 @@ def parallel_figure(findings: Findings, ax: "Axes | None" = None) -> "Figure":
     from matplotlib.colors import Normalize
 
     names, table = parallel_table(findings)
-    if ax is None:
-        ax = new_figure((max(0.62 * len(names) + 1.6, 5.0), 4.6)).subplots()
+    alone = ax is None
+    ax = new_figure((max(0.62 * len(names) + 1.6, 5.0), 4.6)).subplots() if ax is None else ax
     low, high = np.nanmin(table, axis=0), np.nanmax(table, axis=0)
     lines = np.where(high > low, (table - low) / np.where(high > low, high - low, 1.0), 0.5)
     shade = telling_objective(findings)
@@ -150,7 +151,7 @@ def parallel_figure(findings: Findings, ax: "Axes | None" = None) -> "Figure":
     bar = figure_of(ax).colorbar(shades, ax=ax, pad=0.01, shrink=0.8)
     bar.set_label(axis_label(findings.goals.objectives[shade]), fontsize=FONT)
     bar.ax.tick_params(labelsize=FONT - 1)
-    figure_legend(figure_of(ax), [ax])
+    legend_of(ax, alone)
     return figure_of(ax)
 
 
@@ -280,8 +281,8 @@ def agreement_figure(agreement: Mapping[str, np.ndarray], place_name: str = "sta
     share of parameters whose signs agree. cosine, cosine_low, cosine_high, sign_agreement: [S]. place_name: what a
     start is called.
     """
-    if ax is None:
-        ax = new_figure((6.2, 3.2)).subplots()
+    alone = ax is None
+    ax = new_figure((6.2, 3.2)).subplots() if ax is None else ax
     cosine, low, high, signs = (np.atleast_1d(agreement[name]) for name in
                                 ("cosine", "cosine_low", "cosine_high", "sign_agreement"))  # fmt: skip
     place = np.arange(len(cosine))
@@ -293,7 +294,7 @@ def agreement_figure(agreement: Mapping[str, np.ndarray], place_name: str = "sta
     ax.set(ylim=(-1.05, 1.05), xlim=(-0.5, len(cosine) - 0.5))
     _label_axes(ax, place_name, "agreement")
     ax.set_xticks(place, [str(index + 1) for index in place])
-    figure_legend(figure_of(ax), [ax])
+    legend_of(ax, alone)
     return figure_of(ax)
 
 

@@ -18,7 +18,7 @@ from adwa_jax.plan import Plan
 from adwa_jax.presets import jackal
 from adwa_jax.rollout import RobotState
 from adwa_jax.route import Route
-from scenarios.drawing import ORANGE
+from scenarios.drawing import ORANGE, new_figure
 from scenarios.generators import toy
 from scenarios.generators.assembly import grid_of
 from tuning import animation
@@ -349,3 +349,18 @@ def test_arrays_of_jax_are_drawn_as_those_of_numpy():
     on_device = jax.tree.map(jnp.asarray, (SCENARIO, trace_of()))
     ax = drive_figure(on_device[0], PLAN, episode_of(Outcome.STUCK), on_device[1]).axes[0]
     assert the(ax, "robot, end").get_xydata().tolist() == [[1.5, 1.5]]
+
+
+def test_figures_drawn_on_given_axes_keep_their_legends_apart_and_below_their_own_labels():
+    figure = new_figure((9.0, 6.0))
+    axes = figure.subplots(2, 2)
+    results = {"a": results_of(Outcome.REACHED, Outcome.STUCK, Outcome.HIT_MOVER), "b": results_of(Outcome.TIMEOUT)}
+    for ax in axes[0]:
+        outcome_figure(results, ax)
+    for ax in axes[1]:
+        success_figure({"15": (171, 200), "25": (200, 200)}, ax=ax)
+    figure.draw_without_rendering()
+    assert not figure.legends
+    legends = [ax.get_legend().get_window_extent() for ax in axes.flat]
+    plots = [ax.get_window_extent() for ax in axes.flat] + [ax.xaxis.get_tightbbox() for ax in axes.flat]
+    assert not any(one.overlaps(other) for k, one in enumerate(legends) for other in (*legends[k + 1 :], *plots))

@@ -176,7 +176,8 @@ def test_optimism_shows_training_against_held_out():
     figure = optimism_figure(found)
     assert len(figure.axes) == 4
     success = figure.axes[0]
-    assert success.get_xlabel() == "training: success rate [%], more is better"
+    assert success.get_xlabel() == "training: success rate [%]"
+    assert success.get_title() == "more is better"
     containers = {container.get_label(): container for container in success.containers}
     default = found.default
     np.testing.assert_allclose(
@@ -198,3 +199,17 @@ def test_what_is_not_known_is_drawn_as_nothing_rather_than_refused():
     figure = importance_figure(type(found)(**vars(found) | {"importance": nan}))
     assert {text.get_text() for text in figure.axes[0].texts} == {"–"}
     assert isinstance(optimism_figure(found), Figure)
+
+
+def test_figures_drawn_on_given_axes_keep_their_legends_apart_and_below_their_own_labels():
+    figure = new_figure((12.0, 8.0))
+    axes = figure.subplots(2, 2)
+    for ax in axes[0]:
+        parallel_figure(findings(), ax)
+    for ax in axes[1]:
+        agreement_figure(agreement(3), ax=ax)
+    figure.draw_without_rendering()
+    assert not figure.legends
+    legends = [ax.get_legend().get_window_extent() for ax in axes.flat]
+    plots = [ax.get_window_extent() for ax in axes.flat] + [ax.xaxis.get_tightbbox() for ax in axes.flat]
+    assert not any(one.overlaps(other) for k, one in enumerate(legends) for other in (*legends[k + 1 :], *plots))
