@@ -210,7 +210,10 @@ def hypervolume_figure(curve: HypervolumeCurve, ax: "Axes | None" = None) -> "Fi
 
 
 def importance_figure(findings: Findings, ax: "Axes | None" = None) -> "Figure":
-    """Heat map: share [%] of each objective's variation that each parameter explains by itself."""
+    """Heat map: share [%] of each objective's variation that each parameter explains by itself.
+
+    A column need not add up to 100: what parameters that moved together explain counts for each of them.
+    """
     share, objectives = 100.0 * findings.importance, findings.goals.objectives
     if ax is None:
         ax = new_figure((1.35 * len(objectives) + 2.6, 0.34 * len(share) + 1.5)).subplots()
