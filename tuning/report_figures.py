@@ -82,6 +82,20 @@ def in_units(statistic: Statistic, value: Any) -> Any:
     return (100.0 if statistic.measure in RATES else 1.0) * np.asarray(value, np.float64) + 0.0
 
 
+def view_of(statistic: Statistic, values: np.ndarray, share: float = 0.12) -> tuple[float, float]:
+    """Ends of an axis that shows the values, in units as shown, with room of that share of their span at each end.
+
+    Rates end where they can: at 0 and 100 %, but for half a marker's width.
+    """
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    room = share * (high - low) or 0.02 * abs(high) or 1.0
+    ends = low - room, high + room
+    if statistic.measure not in RATES:
+        return ends
+    marker = 0.05 * (ends[1] - ends[0])
+    return max(ends[0], -marker), min(ends[1], 100.0 + marker)
+
+
 def front_figure(findings: Findings, training: Evaluations | None = None, numbered: bool = False) -> "Figure":
     """Every pair of objectives: the front, the default constants and the recommended ones, a line from each to its
     value on the held-out suite; all candidates in grey if `training` is given. One objective: by candidate.
@@ -95,14 +109,14 @@ def front_figure(findings: Findings, training: Evaluations | None = None, number
     figure, panels = _panels(len(pairs), height=3.0)
     cloud = candidate_objectives(findings.goals, training) if training is not None else None
     for ax, (across, up) in zip(panels, pairs, strict=True):
+        _show_members(findings, across, up, ax)
         if cloud is not None:
-            ax.plot(cloud[:, across], cloud[:, up], linestyle="none", marker=".", markersize=4, color=GREY, zorder=1,
-                    label="candidate")  # fmt: skip
+            _draw_candidates(cloud[:, [across, up]], ax)
         _draw_members(findings, across, up, ax)
         if numbered:
             _number_members(findings, across, up, ax)
         _label_axes(ax, axis_label(objectives[across]), axis_label(objectives[up]))
-        _show_members(findings, across, up, ax)
+        _mark_rates(ax, objectives[across], objectives[up])
     figure_legend(figure, panels)
     return figure
 
@@ -125,13 +139,21 @@ def telling_objective(findings: Findings) -> int:
     return int(np.argmax(np.nanmax(objectives, axis=0) > np.nanmin(objectives, axis=0)))
 
 
+def line_colours(count: int = 64) -> list[str]:
+    """Of thin lines, from least to most: `COLOURS` without its light end, which is lost on white."""
+    from matplotlib import colormaps
+    from matplotlib.colors import to_hex
+
+    return [to_hex(colour) for colour in colormaps[COLOURS](np.linspace(0.0, 0.68, count))]
+
+
 def parallel_figure(findings: Findings, ax: "Axes | None" = None) -> "Figure":
     """Parallel coordinates: one line a member of the front through its constants and its objectives on training.
 
     Each axis runs over what is shown; the shade is the first objective in which they differ.
     """
     from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import Normalize
+    from matplotlib.colors import ListedColormap, Normalize
 
     names, table = parallel_table(findings)
     alone = ax is None
@@ -140,9 +162,9 @@ def parallel_figure(findings: Findings, ax: "Axes | None" = None) -> "Figure":
     lines = np.where(high > low, (table - low) / np.where(high > low, high - low, 1.0), 0.5)
     shade = telling_objective(findings)
     shaded = table[:, len(findings.parameters) + shade]
-    shades = ScalarMappable(Normalize(np.nanmin(shaded), np.nanmax(shaded)), COLOURS)
+    shades = ScalarMappable(Normalize(np.nanmin(shaded), np.nanmax(shaded)), ListedColormap(line_colours()))
     for line, value in zip(lines[:-1], shaded[:-1], strict=True):
-        ax.plot(line, color=shades.to_rgba(value), linewidth=1.2, alpha=0.8, zorder=2)
+        ax.plot(line, color=shades.to_rgba(value), linewidth=1.2, zorder=2)
     ax.plot(lines[-1], color=BLACK, linewidth=1.8, linestyle="--", zorder=3, label="default constants")
     best = lines[findings.choices[findings.recommended].member]
     style: dict[str, Any] = CHOSEN | {"markersize": 9}
@@ -195,6 +217,7 @@ def sweep_figure(goals: Goals, training: Evaluations, found: Sequence[Sweep]) ->
             ax.axvline(training.values[0, sweep.parameter], color=BLACK, linestyle="--", linewidth=0.9)
             name = training.parameters[sweep.parameter].replace("_", " ")
             _label_axes(ax, name, name_and_unit(statistic))
+            _mark_rates(ax, None, statistic)
     return figure
 
 
@@ -273,6 +296,7 @@ def optimism_figure(findings: Findings) -> "Figure":
         ends = np.array([*ax.get_xlim(), *ax.get_ylim()])
         ax.axline((ends.min(), ends.min()), slope=1.0, color=GREY, linestyle="--", linewidth=1.0, zorder=0)
         _label_axes(ax, f"training: {name_and_unit(statistic)}", f"held-out: {name_and_unit(statistic)}")
+        _mark_rates(ax, statistic, statistic)
         ax.set_title(axis_label(statistic).rpartition(", ")[2], fontsize="medium")
     figure_legend(figure, panels)
     return figure
@@ -364,10 +388,25 @@ def _show_members(findings: Findings, across: int, up: int, ax: "Axes") -> None:
     judgements = [judged for member in (*findings.front, findings.default)
                   for judged in (member.training, member.held_out) if judged is not None]  # fmt: skip
     points = np.array([_point(judged, across, up, statistics) for judged in judgements])
-    for (low, high), limits in zip(zip(np.nanmin(points, axis=0), np.nanmax(points, axis=0), strict=True),
-                                   (ax.set_xlim, ax.set_ylim), strict=True):  # fmt: skip
-        room = 0.12 * (high - low) or 0.02 * abs(high) or 1.0
-        limits(low - room, high + room)
+    for statistic, values, limits in zip(statistics, points.T, (ax.set_xlim, ax.set_ylim), strict=True):
+        limits(*view_of(statistic, values))
+
+
+def _draw_candidates(points: np.ndarray, ax: "Axes") -> None:
+    """Those [W, 2] within the view; one beyond it is left out rather than cut at the frame."""
+    low, high = np.array([ax.get_xlim(), ax.get_ylim()]).T
+    within = ((points >= low) & (points <= high)).all(axis=1)
+    ax.plot(*np.where(within[:, None], points, np.nan).T, linestyle="none", marker=".", markersize=4, color=GREY,
+            zorder=1, clip_on=False, label="candidate")  # fmt: skip
+
+
+def _mark_rates(ax: "Axes", across: Statistic | None, up: Statistic | None) -> None:
+    """No tick below 0 or above 100 % on the axes of rates; call it when the limits are settled. None: no statistic."""
+    for axis, statistic in ((ax.xaxis, across), (ax.yaxis, up)):
+        if statistic is not None and statistic.measure in RATES:
+            low, high = sorted(axis.get_view_interval())
+            ticks = np.asarray(axis.get_major_locator().tick_values(low, high))
+            axis.set_ticks(ticks[(ticks >= max(low, -1e-9)) & (ticks <= min(high, 100.0 + 1e-9))].tolist())
 
 
 def _single_objective(findings: Findings, training: Evaluations | None) -> "Figure":
@@ -387,6 +426,7 @@ def _single_objective(findings: Findings, training: Evaluations | None) -> "Figu
             ends = np.array([member.row, value]), np.array([member.row, held_out])
             _draw_held_out(*ends, style["color"], kind, ax)
     _label_axes(ax, "candidate, in the order asked for", axis_label(statistic))
+    _mark_rates(ax, None, statistic)
     figure_legend(figure_of(ax), [ax])
     return figure_of(ax)
 

@@ -16,12 +16,14 @@ from tuning.report_figures import (
     hypervolume_figure,
     importance_figure,
     in_units,
+    line_colours,
     optimism_figure,
     parallel_figure,
     parallel_table,
     stability_figure,
     sweep_figure,
     sweeps,
+    view_of,
 )
 
 
@@ -62,6 +64,40 @@ def test_the_front_is_drawn_for_every_pair_of_objectives_with_default_and_recomm
 def test_without_held_out_and_candidates_the_front_stands_alone():
     drawn = front_figure(findings(held_out=False)).axes[0]
     assert {line.get_label() for line in drawn.lines} == {"front", "default constants", "recommended"}
+
+
+def test_rates_are_marked_up_to_100_percent_and_their_axes_end_there_but_for_a_marker():
+    for rates in ([0.0, 100.0], [96.0, 100.0], [100.0, 100.0], [99.7, 99.9]):
+        low, high = view_of(Statistic("success", "max"), np.array(rates))
+        assert low <= min(rates)
+        assert max(rates) < high < 100 + 0.1 * (high - low)
+    found = findings()
+    best = found.default.training.objectives
+    objectives = (best[0]._replace(value=1.0), *best[1:])
+    perfect = replace(found.default, training=replace(found.default.training, objectives=objectives))
+    for ax in front_figure(replace(found, default=perfect)).axes[:3]:
+        assert ax.get_xlim()[1] > 100
+        assert 95 < max(ax.get_xticks()) <= 100
+
+
+def test_candidates_beyond_the_view_are_left_out_and_those_within_are_whole(training):
+    values = training.columns["length_ratio"].copy()
+    values[3] += 9.0
+    strayed = replace(training, columns=training.columns | {"length_ratio": values})
+    for ax in front_figure(findings(), strayed).axes:
+        (drawn,) = [line for line in ax.lines if line.get_label() == "candidate"]
+        points = drawn.get_xydata()[np.isfinite(drawn.get_xydata()).all(axis=1)]
+        low, high = np.array([ax.get_xlim(), ax.get_ylim()]).T
+        assert len(points)
+        assert ((points >= low) & (points <= high)).all()
+        assert not drawn.get_clip_on()
+
+
+def test_the_lines_of_members_are_dark_enough_for_white_paper():
+    channels = np.array([[int(colour[place : place + 2], 16) for place in (1, 3, 5)] for colour in line_colours()])
+    lightness = channels @ [0.299, 0.587, 0.114] / 255
+    assert lightness.max() < 0.65
+    assert (np.diff(lightness) > -0.01).all()
 
 
 def test_numbered_members_carry_the_numbers_of_the_tables():
