@@ -8,14 +8,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from adwa_jax.episode import Outcome
-from scenarios.drawing import BLACK, BLUE, FONT, OCCUPIED, draw_ends, draw_map, draw_movers
+from scenarios.drawing import BLACK, BLUE, FONT, OCCUPIED, draw_movers
 from tuning.figures import (
     disc_centres,
+    draw_ends,
     draw_hidden_cells,
     draw_last_route,
     draw_outline,
     draw_polyline,
     draw_sensed_squares,
+    draw_used_map,
+    drive_points,
     driven_path,
     driven_ways,
     last_heading,
@@ -36,10 +39,10 @@ def draw_last_seconds(driven: Replay, ax: "Axes", seconds: float = 4.0, title: s
     with their trails and an arrow for the way of the next second, the robot and its local target at the end.
 
     Dots mark whole seconds. Returns what a colour bar of the time [s] needs, None for a robot that never drove: then
-    all of the map is shown.
+    all of the map that is in use is shown.
     """
     scenario, trace, steps = driven.scenario, driven.trace, int(driven.trace.length)
-    draw_map(scenario.grid, ax, y_down)
+    draw_used_map(scenario.grid, drive_points(scenario, driven.plan, trace), ax, y_down)
     ax.set_facecolor(OCCUPIED)  # beyond the map
     draw_hidden_cells(scenario, trace, ax)
     draw_sensed_squares(scenario, np.asarray(trace.known)[steps - 1] if steps else None, ax)

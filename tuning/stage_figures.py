@@ -21,17 +21,15 @@ from scenarios.drawing import (
     ORANGE,
     SKY,
     VERMILLION,
-    draw_ends,
     draw_map,
     draw_movers,
     draw_squares,
     extent,
     figure_of,
     legend_below,
-    map_size,
     new_figure,
 )
-from tuning.figures import disc_centres, draw_outline
+from tuning.figures import disc_centres, draw_ends, draw_outline, draw_used_map, used_map_size
 from tuning.planning import path_length
 from tuning.stages import Densities, Moment
 
@@ -48,7 +46,7 @@ REFUSED = "#9A9A9A"
 def density_figure(scenario: Scenario, found: Densities, cell: tuple[int, int] | None = None, y_down: bool = False,
                    ax: "Axes | None" = None) -> "Figure":
     """P of eq. 2 for every free cell, as a share of Q; the dashed rectangle is that of `cell` (row, col)."""
-    ax = _map_with_bar(scenario.grid, ax, y_down)
+    ax = _map_with_bar(scenario.grid, _ends(scenario), ax, y_down)
     _draw_field(scenario.grid, found.local / max(found.overall, 1e-9), ax, "density to the goal ÷ map's, P/Q [1]")
     draw_ends(scenario.start[:2], scenario.goal, ax)
     if cell is not None:
@@ -60,7 +58,7 @@ def density_figure(scenario: Scenario, found: Densities, cell: tuple[int, int] |
 
 def weight_figure(scenario: Scenario, found: Densities, y_down: bool = False, ax: "Axes | None" = None) -> "Figure":
     """ω of eq. 5 for every free cell; − stands where it is below 1 (dense), + where above (sparse)."""
-    ax = _map_with_bar(scenario.grid, ax, y_down)
+    ax = _map_with_bar(scenario.grid, _ends(scenario), ax, y_down)
     _draw_field(scenario.grid, found.weight, ax, "heuristic weight ω [1]")
     draw_ends(scenario.start[:2], scenario.goal, ax)
     _draw_signs(scenario.grid, found.weight, ax)
@@ -75,12 +73,12 @@ def weight_figure(scenario: Scenario, found: Densities, y_down: bool = False, ax
 def expansion_figure(grid: Grid, found: SearchResult, name: str = "A*", y_down: bool = False,
                      ax: "Axes | None" = None) -> "Figure":
     """Cells coloured by the order in which the search closed them, cells it never closed white, and the grid path."""
-    ax = _map_with_bar(grid, ax, y_down)
+    cells = np.asarray(found.path)[: int(found.path_cells)]
+    path = (cells[:, ::-1] + 0.5) * float(grid.resolution) + np.asarray(grid.origin)
+    ax = _map_with_bar(grid, path, ax, y_down)
     rows, columns = int(grid.height), int(grid.width)
     order = np.asarray(found.expanded_at)[:rows, :columns]
     _draw_field(grid, np.where(order >= 0, order + 1.0, np.nan), ax, "order of expansion [1]")
-    cells = np.asarray(found.path)[: int(found.path_cells)]
-    path = (cells[:, ::-1] + 0.5) * float(grid.resolution) + np.asarray(grid.origin)
     ax.plot(*path.T, color=BLACK, linewidth=2.0, zorder=4, label="grid path")
     if len(path):
         draw_ends(path[0], path[-1], ax)
@@ -183,10 +181,16 @@ def draw_terms(moment: Moment, ax: "Axes | None" = None) -> "Axes":
     return ax
 
 
-def _map_with_bar(grid: Grid, ax: "Axes | None", y_down: bool) -> "Axes":
-    """The map's axes; those made here leave room for a bar of colours beside it."""
-    width, height = map_size(grid)
-    return draw_map(grid, ax if ax is not None else new_figure((width + 1.1, height - 0.2)).subplots(), y_down)
+def _ends(scenario: Scenario) -> np.ndarray:
+    """[2, 2] (x, y) [m]: start and goal."""
+    return np.stack([np.asarray(scenario.start)[:2], np.asarray(scenario.goal)])
+
+
+def _map_with_bar(grid: Grid, points: np.ndarray, ax: "Axes | None", y_down: bool) -> "Axes":
+    """The map's axes, with points [N, 2] (x, y) [m]; those made here leave room for a bar of colours beside it."""
+    width, height = used_map_size(grid, points)
+    ax = ax if ax is not None else new_figure((width + 1.1, height - 0.2)).subplots()
+    return draw_used_map(grid, points, ax, y_down)
 
 
 def _draw_field(grid: Grid, values: np.ndarray, ax: "Axes", label: str) -> None:

@@ -24,6 +24,7 @@ from scenarios.generators.assembly import grid_of
 from tuning import animation
 from tuning.animation import animate_drive
 from tuning.figures import (
+    MARGIN,
     Comparison,
     compare_drives,
     compare_plans,
@@ -159,6 +160,28 @@ def test_a_plan_without_a_path_says_why():
     for ax in (plan_figure(GRID, lost).axes[0], *compare_plans([Comparison("", GRID, lost, lost)]).axes):
         assert ax.get_title().endswith("no path: UNREACHABLE")
         assert the(ax, "start").get_xydata().tolist() == [[0.5, 0.5]]
+
+
+def test_a_wide_margin_of_obstacles_is_cropped_but_no_end_or_path():
+    occupied = np.ones((60, 80), bool)
+    occupied[20:30, 30:50] = False
+    grid = grid_of(occupied, 0.5, (-1.0, 2.0))
+    within = planned(np.array([[22, 35], [22, 36]]), np.array([[22, 35], [22, 36]]))
+    path = within.path * 0.5 + np.float32([-1.0, 2.0])
+    within = replace(within, start=tuple(path[0]), goal=tuple(path[1]), path=path, key_points=path)
+    ax = plan_figure(grid, within).axes[0]
+    assert ax.get_xlim() == (-1 + 0.5 * (30 - MARGIN), -1 + 0.5 * (50 + MARGIN))
+    assert ax.get_ylim() == (2 + 0.5 * (20 - MARGIN), 2 + 0.5 * (30 + MARGIN))
+    assert plan_figure(grid, within, y_down=True).axes[0].get_ylim() == ax.get_ylim()[::-1]
+    left, right = plan_figure(grid, replace(within, goal=(1.0, 13.0))).axes[0].get_xlim()
+    assert left < 1.0
+    assert right == ax.get_xlim()[1]
+
+
+def test_the_goal_lies_below_key_points_and_danger_points_near_it():
+    for found, label in ((TRADITIONAL, "danger point"), (IMPROVED, "key point")):
+        ax = plan_figure(GRID, found).axes[0]
+        assert the(ax, "grid path").get_zorder() < the(ax, "goal").get_zorder() < the(ax, label).get_zorder()
 
 
 def test_a_map_that_counts_rows_downwards_is_drawn_so():
