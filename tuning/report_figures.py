@@ -305,8 +305,8 @@ def optimism_figure(findings: Findings) -> "Figure":
 def agreement_figure(agreement: Mapping[str, np.ndarray], place_name: str = "start",
                      ax: "Axes | None" = None) -> "Figure":
     """Cosine between the surrogate's gradient and the hard planner's at each start, with its 95 % interval, and the
-    share of parameters whose signs agree. cosine, cosine_low, cosine_high, sign_agreement: [S]. place_name: what a
-    start is called.
+    share of parameters whose signs agree, with that of chance. cosine, cosine_low, cosine_high, sign_agreement: [S].
+    place_name: what a start is called.
     """
     alone = ax is None
     ax = new_figure((6.2, 3.2)).subplots() if ax is None else ax
@@ -318,8 +318,9 @@ def agreement_figure(agreement: Mapping[str, np.ndarray], place_name: str = "sta
     ax.plot(place + 0.1, signs, linestyle="none", marker="D", markersize=6, markerfacecolor=ORANGE,
             markeredgecolor=BLACK, label="share of signs that agree")  # fmt: skip
     ax.axhline(0.0, color=BLACK, linewidth=0.8, linestyle="--")
+    ax.axhline(0.5, color=ORANGE, linewidth=1.0, linestyle=":", zorder=1, label="signs that agree by chance")
     ax.set(ylim=(-1.05, 1.05), xlim=(-0.5, len(cosine) - 0.5))
-    _label_axes(ax, place_name, "agreement")
+    _label_axes(ax, place_name, "agreement [1]")
     ax.set_xticks(place, [str(index + 1) for index in place])
     legend_of(ax, alone)
     return figure_of(ax)

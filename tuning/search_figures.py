@@ -98,12 +98,15 @@ def draw_tradeoff(constant: Mapping[float, Tradeoff], shapes: Mapping[str, Trade
     ax.plot(*line.T, color=BLUE, marker="o", markersize=4, zorder=2, label="constant ω")
     for place in _apart(line):
         weight = list(constant)[place]
-        ax.annotate(f"ω = {weight:g}", line[place], textcoords="offset points", xytext=(5, 5), fontsize=FONT - 2)
+        last = line[place, 0] == line[:, 0].max()  # beside it is the frame
+        ax.annotate(f"ω = {weight:g}", line[place], textcoords="offset points", xytext=(0 if last else 5, 5),
+                    ha="center" if last else "left", fontsize=FONT - 2)  # fmt: skip
     for (name, found), marker in zip(shapes.items(), MARKS, strict=False):
         ax.plot(found.expansions[0], found.length[0], marker=marker, markersize=8, markerfacecolor=ORANGE,
                 markeredgecolor=BLACK, linestyle="none", zorder=3, label=name)
     ax.set_xlabel("expansions ÷ those of ω = 1 [1]", fontsize=FONT)
     ax.set_ylabel("path length ÷ that of ω = 1 [1]", fontsize=FONT)
+    ax.margins(0.1)  # room for labels
     ax.tick_params(labelsize=FONT - 1)
     return ax
 

@@ -227,6 +227,9 @@ def test_agreement_has_a_place_a_start():
     assert [tick.get_text() for tick in ax.get_xticklabels()] == ["1", "2", "3"]
     (signs,) = [line for line in ax.lines if line.get_label() == "share of signs that agree"]
     np.testing.assert_allclose(signs.get_ydata(), 2 / 3)
+    (chance,) = [line for line in ax.lines if line.get_label() == "signs that agree by chance"]
+    assert set(chance.get_ydata()) == {0.5}
+    assert ax.get_ylabel() == "agreement [1]"
 
 
 def test_what_is_not_known_is_drawn_as_nothing_rather_than_refused():
