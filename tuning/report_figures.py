@@ -357,7 +357,9 @@ def _draw_members(findings: Findings, across: int, up: int, ax: "Axes") -> None:
 
 
 def _number_members(findings: Findings, across: int, up: int, ax: "Axes") -> None:
-    """Members at one place share a label; a white rim keeps it apart from what lies under it."""
+    """Members at one place share a label, which lies beside its mark where it hides the least of marks and labels; a
+    white rim keeps it apart from what lies under it, and a line leads to it where it is far.
+    """
     from matplotlib.patheffects import withStroke
 
     statistics = findings.goals.objectives[across], findings.goals.objectives[up]
@@ -365,9 +367,42 @@ def _number_members(findings: Findings, across: int, up: int, ax: "Axes") -> Non
     for number, member in enumerate(findings.front, start=1):
         x, y = _point(member.training, across, up, statistics).tolist()
         numbers.setdefault((x, y), []).append(str(number))
-    for place, there in numbers.items():
-        ax.annotate(", ".join(there), place, xytext=(5, 5), textcoords="offset points", fontsize=FONT - 1, zorder=6,
-                    path_effects=[withStroke(linewidth=2.0, foreground="white")])  # fmt: skip
+    labels = [", ".join(there) for there in numbers.values()]
+    best, default = (_point(one.training, across, up, statistics) for one in (recommended(findings), findings.default))
+    marks = [*((place, 3.0) for place in numbers), (default, 4.5), (best, 7.0)]
+    for place, label, offset in zip(numbers, labels, _label_offsets(list(numbers), labels, marks, ax), strict=True):
+        far = float(np.hypot(*offset)) > 13.0
+        ax.annotate(label, place, xytext=offset, textcoords="offset points", fontsize=FONT - 1, zorder=6, ha="center",
+                    va="center", path_effects=[withStroke(linewidth=2.0, foreground="white")],
+                    arrowprops={"arrowstyle": "-", "color": GREY, "linewidth": 0.6} if far else None)  # fmt: skip
+
+
+def _label_offsets(places: Sequence[tuple[float, float]], labels: Sequence[str],
+                   marks: Sequence[tuple[Any, float]], ax: "Axes") -> list[tuple[float, float]]:
+    """Of each label's middle from its place [pt], one after the other where least is hidden.
+
+    marks: places with half their size [pt].
+    """
+    scale = 72.0 / figure_of(ax).dpi
+    taken = [(*(scale * ax.transData.transform(place)), half, half) for place, half in marks]  # middle, half sizes
+    low, high = scale * np.array(ax.bbox.min), scale * np.array(ax.bbox.max)
+    angles = np.deg2rad([45, 135, -45, -135, 90, 0, 180, -90])
+    found = []
+    for place, label in zip(places, labels, strict=True):
+        middle, half = scale * ax.transData.transform(place), np.array([2.6 * len(label) + 0.5, 4.0])
+        offsets = [(distance + np.array([half[0] - 3.0, 0.0])) * np.array([np.cos(angle), np.sin(angle)])
+                   for distance in (9.0, 12.0, 17.0, 23.0) for angle in angles]  # fmt: skip
+        boxes = np.array(taken)
+        costs = []
+        for offset in offsets:
+            at = middle + offset
+            shared = np.maximum(half + boxes[:, 2:] - np.abs(at - boxes[:, :2]), 0.0)
+            outside = np.maximum(low + half - at, 0.0) + np.maximum(at + half - high, 0.0)
+            costs.append(shared.prod(axis=1).sum() + 40.0 * outside.sum() + 0.2 * np.hypot(*offset))
+        offset = offsets[int(np.argmin(costs))]
+        taken.append((*(middle + offset), *half))
+        found.append((float(offset[0]), float(offset[1])))
+    return found
 
 
 def _draw_held_out(trained: np.ndarray, held_out: np.ndarray, color: str, kind: str, ax: "Axes") -> None:

@@ -107,6 +107,16 @@ def test_numbered_members_carry_the_numbers_of_the_tables():
         assert [text.get_text() for text in ax.texts] == ["1, 4", "2", "3"]
 
 
+def test_members_numbers_hide_neither_each_other_nor_the_star_and_the_square():
+    figure = front_figure(findings(held_out=False), numbered=True)
+    figure.draw_without_rendering()
+    for ax in figure.axes:
+        texts = [text.get_window_extent() for text in ax.texts]
+        marks = [ax.transData.transform(drawn_points(ax, label)[0]) for label in ("recommended", "default constants")]
+        assert not any(one.overlaps(other) for k, one in enumerate(texts) for other in texts[k + 1 :])
+        assert not any(text.contains(*mark) for text in texts for mark in marks)
+
+
 def test_a_member_chosen_by_hand_is_drawn_as_chosen():
     found = chosen_by_hand(findings(), 2, evaluations(seed=1), np.arange(len(VALUES)), 0)
     third = found.front[2].training.objectives
