@@ -22,10 +22,7 @@ from scenarios.drawing import (
     PURPLE,
     SKY,
     VERMILLION,
-    draw_ends,
-    draw_map,
     draw_squares,
-    map_size,
     new_figure,
 )
 from scenarios.errors import InputError
@@ -33,13 +30,17 @@ from tuning.figures import (
     COLLISIONS,
     SENTENCES,
     disc_centres,
+    draw_ends,
     draw_hidden_cells,
     draw_last_route,
     draw_outline,
     draw_polyline,
+    draw_used_map,
+    drive_points,
     driven_path,
     driven_ways,
     prefixed,
+    used_map_size,
 )
 
 MOST_FRAMES = 150
@@ -82,8 +83,9 @@ class _Film:
         self.dt = float(episode.measures.time) / self.steps if self.steps else 0.1
         self.outcome, self.title = Outcome(int(episode.outcome)), prefixed(title)
         self.start_heading = float(np.asarray(scenario.start)[2])
-        self.figure = new_figure(map_size(scenario.grid, legend=0.0))
-        self.ax = draw_map(scenario.grid, self.figure.subplots(), y_down)
+        points = drive_points(scenario, plan, trace)
+        self.figure = new_figure(used_map_size(scenario.grid, points, legend=0.0))
+        self.ax = draw_used_map(scenario.grid, points, self.figure.subplots(), y_down)
         self._draw_fixed(scenario, plan, episode)
         self._draw_moving(scenario, robot)
         self.show(0)

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from adwa_jax.presets import Preset
-from scenarios.drawing import FONT, figure_legend, legend_below, map_size, new_figure
+from scenarios.drawing import FONT, figure_legend, legend_below, new_figure
 from scenarios.suite import Suite
 from tuning.evaluations import Evaluations
-from tuning.figures import drive_figure, drive_sentence
+from tuning.figures import drive_figure, drive_points, drive_sentence, used_map_size
 from tuning.gallery import SECONDS, Cause, cause_by_result, turned_back
 from tuning.last_seconds import draw_last_seconds
 from tuning.outputs import save_figure
@@ -44,7 +44,8 @@ def worst_figure(suite: Suite, preset: Preset, results: Results, limit: int = 3,
     """
     shown = worst(results)[:limit]
     driven = [replay(suite.scenarios[index], preset) for index in shown]
-    height = max(map_size(one.scenario.grid, 4.4, 0.6)[1] for one in driven)
+    height = max(used_map_size(one.scenario.grid, drive_points(one.scenario, one.plan, one.trace), 4.4, 0.6)[1]
+                 for one in driven)  # fmt: skip
     figure = new_figure((4.4 * len(shown), height))
     axes = figure.subplots(1, len(shown), squeeze=False)[0].tolist()
     shaded = None

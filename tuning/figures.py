@@ -5,11 +5,13 @@ Dimension letters: P path cells; Q key points; T control steps; M movers; D disc
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
+from numpy.typing import ArrayLike
 
 from adwa_jax.astar import Status
 from adwa_jax.episode import Episode, Outcome
@@ -20,6 +22,7 @@ from adwa_jax.metrics import danger_corners, danger_steps
 from adwa_jax.plan import Plan
 from adwa_jax.scenario import Scenario
 from adwa_jax.window import RobotLimits
+from scenarios import drawing
 from scenarios.drawing import (
     BLACK,
     BLUE,
@@ -30,12 +33,12 @@ from scenarios.drawing import (
     PURPLE,
     SKY,
     VERMILLION,
-    draw_ends,
     draw_hidden,
     draw_map,
     draw_mover_ways,
     draw_movers,
     draw_squares,
+    extent,
     figure_legend,
     figure_of,
     legend_below,
@@ -76,6 +79,7 @@ OUTCOME_STYLES = {
     Outcome.TIMEOUT: ("#FFFFFF", "----"),
     Outcome.NO_PATH: (PURPLE, "++++"),
 }
+MARGIN = 4  # cells shown around the part of a map that holds anything but obstacles
 COLLISIONS = (Outcome.HIT_KNOWN, Outcome.HIT_UNKNOWN, Outcome.HIT_MOVER)
 
 
@@ -95,7 +99,7 @@ def plan_figure(grid: Grid, plan: Plan | PlannedPath, planner: str = "A*", y_dow
     planner: named in the title, with length, breaking points and danger points of both.
     """
     planned = planned_path(grid, plan)
-    ax = draw_map(grid, ax, y_down)
+    ax = draw_used_map(grid, _points(planned), ax, y_down)
     draw_ends(planned.start, planned.goal, ax)
     _draw_route(grid, planned, "path", ax)
     if len(planned.key_points):
@@ -116,7 +120,8 @@ def compare_plans(comparisons: Sequence[Comparison], axes: Any = None, y_down: b
     shape = (2, len(comparisons)) if several else (1, 2)
     figure = None
     if axes is None:
-        height = max(map_size(comparison.grid, 3.6, 0.15)[1] for comparison in comparisons)
+        height = max(used_map_size(grid, _points(planned_path(grid, plan)), 3.6, 0.15)[1]
+                     for _, grid, *plans in comparisons for plan in plans)  # fmt: skip
         figure = new_figure((3.6 * shape[1], height * shape[0] + 0.4))
         axes = figure.subplots(*shape, squeeze=False)
     axes = np.asarray(axes).reshape(shape)
@@ -140,7 +145,7 @@ def drive_figure(scenario: Scenario, plan: Plan, episode: Episode, trace: Trace,
     Unbatched; the plan and trace may be padded. title: put before the outcome. robot: its outline at the end is drawn
     to scale.
     """
-    ax = draw_map(scenario.grid, ax, y_down)
+    ax = draw_used_map(scenario.grid, drive_points(scenario, plan, trace), ax, y_down)
     steps = int(trace.length)
     draw_hidden_cells(scenario, trace, ax)
     ways = driven_ways(scenario, trace)
@@ -168,7 +173,8 @@ def drive_figure(scenario: Scenario, plan: Plan, episode: Episode, trace: Trace,
 
 def compare_drives(drives: Mapping[str, "Replay"], y_down: bool = False) -> "Figure":
     """Fig. 4: drives side by side, each as `drive_figure` has it under its name, with one legend."""
-    height = max(map_size(driven.scenario.grid, 4.6, 0.6)[1] for driven in drives.values())
+    height = max(used_map_size(driven.scenario.grid, drive_points(driven.scenario, driven.plan, driven.trace), 4.6,
+                               0.6)[1] for driven in drives.values())  # fmt: skip
     figure = new_figure((4.6 * len(drives), height))
     axes = figure.subplots(1, len(drives), squeeze=False)[0]
     for (name, driven), ax in zip(drives.items(), axes, strict=True):
@@ -180,8 +186,8 @@ def compare_drives(drives: Mapping[str, "Replay"], y_down: bool = False) -> "Fig
 
 def outcome_figure(results: Mapping[str, "Results"], ax: "Axes | None" = None) -> "Figure":
     """How the scenarios ended, a bar a planner; its success with the 95 % Wilson interval stands behind its name."""
-    if ax is None:
-        ax = new_figure((8.2, 0.5 * len(results) + 1.5)).subplots()
+    alone = ax is None
+    ax = new_figure((8.2, 0.5 * len(results) + 1.5)).subplots() if ax is None else ax
     left = np.zeros(len(results))
     for outcome, (colour, hatch) in OUTCOME_STYLES.items():
         share = np.array([100 * np.mean(found.outcome == outcome) for found in results.values()])
@@ -194,7 +200,7 @@ def outcome_figure(results: Mapping[str, "Results"], ax: "Axes | None" = None) -
     ax.set(xlim=(0, 100))
     ax.set_xlabel("scenarios [%]", fontsize=FONT)
     ax.tick_params(labelsize=FONT - 1)
-    figure_legend(figure_of(ax), [ax])
+    legend_of(ax, alone)
     return figure_of(ax)
 
 
@@ -204,8 +210,8 @@ def success_figure(rates: Mapping[str, tuple[int, int]], paper: float | None = P
 
     rates: name -> (successes, scenarios).
     """
-    if ax is None:
-        ax = new_figure((1.1 * len(rates) + 1.9, 3.2)).subplots()
+    alone = ax is None
+    ax = new_figure((1.1 * len(rates) + 1.9, 3.2)).subplots() if ax is None else ax
     place = np.arange(len(rates))
     share = np.array([successes / max(count, 1) for successes, count in rates.values()])
     low, high = np.array([wilson(successes, count) for successes, count in rates.values()]).T
@@ -222,7 +228,7 @@ def success_figure(rates: Mapping[str, tuple[int, int]], paper: float | None = P
     ax.set_ylabel("success rate [%], 95 % interval", fontsize=FONT)
     ax.tick_params(labelsize=FONT - 1)
     if paper is not None:
-        figure_legend(figure_of(ax), [ax])
+        legend_of(ax, alone)
     return figure_of(ax)
 
 
@@ -310,6 +316,59 @@ def drive_sentence(plan: Plan, episode: Episode) -> str:
             f"{float(plan.key_point_length):.2f} m planned, least clearance {float(measures.least_clearance):.2f} m")
 
 
+def draw_used_map(grid: Grid, points: np.ndarray, ax: "Axes | None" = None, y_down: bool = False) -> "Axes":
+    """`draw_map`, cropped to `used_part`."""
+    if ax is None:
+        ax = new_figure(used_map_size(grid, points)).subplots()
+    draw_map(grid, ax, y_down)
+    left, right, bottom, top = used_part(grid, points)
+    ax.set(xlim=(left, right), ylim=(top, bottom) if y_down else (bottom, top))
+    return ax
+
+
+def used_map_size(grid: Grid, points: np.ndarray, width: float = 5.0, legend: float = 1.0) -> tuple[float, float]:
+    """`map_size` of `used_part`."""
+    left, right, bottom, top = used_part(grid, points)
+    rows, columns = (round((end - start) / float(grid.resolution)) for start, end in ((bottom, top), (left, right)))
+    return map_size(replace(grid, height=jnp.int32(rows), width=jnp.int32(columns)), width, legend)
+
+
+def used_part(grid: Grid, points: np.ndarray) -> tuple[float, float, float, float]:
+    """Left, right, bottom, top [m] of all free cells and of points [N, 2] (x, y) [m], with `MARGIN` cells around.
+
+    No more than the map, beyond which only points lie. Without it, wide unknown margins would be most of a picture.
+    """
+    left, right, bottom, top = extent(grid)
+    side, origin = float(grid.resolution), np.array([left, bottom])
+    cells = np.argwhere(~np.asarray(grid.occupied)[: int(grid.height), : int(grid.width)])[:, ::-1]
+    finite = points[np.isfinite(points).all(axis=1)]
+    corners = np.concatenate([cells, cells + 1, (finite - origin) / side])
+    if not len(corners):
+        return left, right, bottom, top
+    low, high = np.floor(corners.min(axis=0)) - MARGIN, np.ceil(corners.max(axis=0)) + MARGIN
+    low, high = np.maximum(low, 0), np.minimum(high, (int(grid.width), int(grid.height)))
+    left, bottom = np.minimum(origin + low * side, finite.min(axis=0, initial=np.inf)).tolist()
+    right, top = np.maximum(origin + high * side, finite.max(axis=0, initial=-np.inf)).tolist()
+    return left, right, bottom, top
+
+
+def drive_points(scenario: Scenario, plan: Plan, trace: Trace) -> np.ndarray:
+    """[N, 2] (x, y) [m]: start, goal, key points, driven path and last route."""
+    return np.concatenate([
+        np.asarray(scenario.goal)[None],
+        np.asarray(plan.key_points)[: int(plan.key_point_count)],
+        driven_path(scenario, trace),
+        np.asarray(trace.route.points)[: int(trace.route.count)],
+    ])  # fmt: skip
+
+
+def draw_ends(start: ArrayLike, goal: ArrayLike, ax: "Axes") -> None:
+    """Start and goal, (x, y) [m], below key points and danger points that lie near them; NaN is not drawn."""
+    drawing.draw_ends(start, goal, ax)
+    for end in ax.lines[-2:]:
+        end.set_zorder(6.3)
+
+
 def draw_polyline(key_points: np.ndarray, ax: "Axes", linestyle: str, label: str = "key-point path") -> None:
     """The key-point polyline [Q, 2], a diamond at each key point between its ends."""
     ax.plot(*key_points.T, color=BLACK, linewidth=1.6, linestyle=linestyle, zorder=5, label=label)
@@ -362,6 +421,26 @@ def draw_outline(discs: np.ndarray, radius: float, ax: "Axes", label: str = "rob
             for index, (x, y) in enumerate(discs)]  # fmt: skip
 
 
+def legend_of(ax: "Axes", alone: bool) -> None:
+    """One under the figure where the axes stand `alone` in it, else under their own x axis, below its labels."""
+    from matplotlib.transforms import ScaledTranslation
+
+    figure = figure_of(ax)
+    if alone:
+        figure_legend(figure, [ax])
+        return
+    names = [name for name in ax.get_legend_handles_labels()[1] if name]
+    widest = max((len(name) for name in names), default=0)
+    inches = figure.get_figwidth() * ax.get_position().width
+    legend_below(ax, columns=max(1, min(len(names), int(inches / (0.065 * widest + 0.5)))))
+    labels = ax.xaxis.get_tightbbox()
+    down = (ax.bbox.y0 - labels.y0) / figure.dpi if labels else 0.0
+    below = ax.transAxes + ScaledTranslation(0.0, -down - 0.06, figure.dpi_scale_trans)
+    legend = ax.get_legend()
+    if legend:
+        legend.set_bbox_to_anchor((0.5, 0.0), below)
+
+
 def prefixed(title: str) -> str:
     """The title, if there is one, before what follows it."""
     return f"{title}: " if title else ""
@@ -373,9 +452,14 @@ def _rated(name: str, results: "Results") -> str:
     return f"{name}\n{100 * reached / count:.1f} % [{100 * low:.1f}, {100 * high:.1f}]"
 
 
+def _points(planned: PlannedPath) -> np.ndarray:
+    """[N, 2] (x, y) [m]: all that is drawn of a plan."""
+    return np.concatenate([np.array([planned.start, planned.goal]), planned.path, planned.key_points])
+
+
 def _draw_panel(grid: Grid, plan: Plan | PlannedPath, route: Route, name: str, ax: "Axes", y_down: bool) -> None:
     planned = planned_path(grid, plan)
-    draw_map(grid, ax, y_down)
+    draw_used_map(grid, _points(planned), ax, y_down)
     draw_ends(planned.start, planned.goal, ax)
     if route == "path":
         _draw_route(grid, planned, route, ax)

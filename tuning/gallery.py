@@ -125,8 +125,8 @@ def turned_back(driven: Replay) -> bool:
 def sheet(cause: Cause, group: Group, suite: Suite, seconds: float = SECONDS, y_down: bool = False) -> "Figure":
     """The last seconds of the failures shown, side by side."""
     count = len(group.shown)
-    columns = min(count, COLUMNS)
-    rows = ceil(count / columns)
+    rows = ceil(count / COLUMNS)
+    columns = ceil(count / rows)
     figure = new_figure((3.1 * columns + 1.0, 3.3 * rows + 1.2))
     tiles = figure.subplots(rows, columns, squeeze=False).ravel().tolist()
     shaded = None

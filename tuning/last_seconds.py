@@ -3,19 +3,24 @@
 Dimension letters: T points of time; M movers.
 """
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from adwa_jax.episode import Outcome
-from scenarios.drawing import BLACK, BLUE, FONT, OCCUPIED, draw_ends, draw_map, draw_movers
+from adwa_jax.scenario import Scenario
+from scenarios.drawing import BLACK, BLUE, FONT, OCCUPIED, draw_movers
 from tuning.figures import (
     disc_centres,
+    draw_ends,
     draw_hidden_cells,
     draw_last_route,
     draw_outline,
     draw_polyline,
     draw_sensed_squares,
+    draw_used_map,
+    drive_points,
     driven_path,
     driven_ways,
     last_heading,
@@ -36,11 +41,16 @@ def draw_last_seconds(driven: Replay, ax: "Axes", seconds: float = 4.0, title: s
     with their trails and an arrow for the way of the next second, the robot and its local target at the end.
 
     Dots mark whole seconds. Returns what a colour bar of the time [s] needs, None for a robot that never drove: then
-    all of the map is shown.
+    all of the map that is in use is shown.
     """
     scenario, trace, steps = driven.scenario, driven.trace, int(driven.trace.length)
-    draw_map(scenario.grid, ax, y_down)
+    draw_used_map(scenario.grid, drive_points(scenario, driven.plan, trace), ax, y_down)
     ax.set_facecolor(OCCUPIED)  # beyond the map
+    first = max(steps - round(seconds / step_of(driven)), 0) if steps else 0
+    path = driven_path(scenario, trace)[first:]
+    if steps:
+        _crop(path, ax, y_down)
+        scenario = _squares_in_view(scenario, ax)
     draw_hidden_cells(scenario, trace, ax)
     draw_sensed_squares(scenario, np.asarray(trace.known)[steps - 1] if steps else None, ax)
     draw_ends(scenario.start[:2], scenario.goal, ax)
@@ -51,15 +61,13 @@ def draw_last_seconds(driven: Replay, ax: "Axes", seconds: float = 4.0, title: s
     ax.set(xlabel="", ylabel="")
     if not steps:
         return None
-    first = max(steps - round(seconds / step_of(driven)), 0)
     times = (np.arange(first, steps + 1) - steps) * step_of(driven)
-    path = driven_path(scenario, trace)[first:]
     shades = {"cmap": COLOURS, "vmin": -seconds, "vmax": 0.0}
     _draw_movers(driven, first, times, ax, shades)
     shaded = _draw_trail(path, times, ax, shades, width=3.0)
     shaded.set_label("driven path")
     _draw_robot(driven, path[-1], ax)
-    _crop(path, ax, y_down)
+    _list_what_is_in_view(ax)
     return shaded
 
 
@@ -87,7 +95,9 @@ def _draw_robot(driven: Replay, position: np.ndarray, ax: "Axes") -> None:
 def _draw_movers(driven: Replay, first: int, times: np.ndarray, ax: "Axes", shades: dict[str, Any]) -> None:
     """Where they are at the end, the way that led there, and where they were going."""
     ways = driven_ways(driven.scenario, driven.trace)[first:]
-    draw_movers(ways[-1], np.asarray(driven.scenario.movers.radius), ax, "mover, end", alpha=0.7)
+    radius = np.asarray(driven.scenario.movers.radius)
+    seen = _in_view(ways[-1], radius, ax)
+    draw_movers(ways[-1, seen], radius[seen], ax, "mover, end", alpha=0.7)
     for way in np.swapaxes(ways, 0, 1):
         _draw_trail(way, times, ax, shades, width=1.5)
     velocity = np.asarray(driven.trace.movers.velocity)[int(driven.trace.length) - 1, : ways.shape[1]]
@@ -121,3 +131,35 @@ def _crop(path: np.ndarray, ax: "Axes", y_down: bool) -> None:
     ax.set_xlim(middle[0] - half, middle[0] + half)
     ends = (middle[1] - half, middle[1] + half)
     ax.set_ylim(*(ends[::-1] if y_down else ends))
+
+
+def _in_view(centre: np.ndarray, half: np.ndarray, ax: "Axes") -> np.ndarray:
+    """[N] bool: which of things about centres [N, 2], of half sizes [N] [m], reach into the view."""
+    low, high = np.sort([ax.get_xlim(), ax.get_ylim()], axis=1).T
+    return np.all((centre + half[:, None] > low) & (centre - half[:, None] < high), axis=1)
+
+
+def _squares_in_view(scenario: Scenario, ax: "Axes") -> Scenario:
+    """The scenario with those unknown squares only."""
+    squares = scenario.squares
+    half = np.asarray(squares.half_width) + np.asarray(squares.rounding)
+    seen = np.asarray(squares.valid) & _in_view(np.asarray(squares.centre), half, ax)
+    return replace(scenario, squares=replace(squares, valid=seen))  # pyright: ignore[reportArgumentType]
+
+
+def _list_what_is_in_view(ax: "Axes") -> None:
+    """Lines, marks and cells beyond the view are not in the legend."""
+    from matplotlib.transforms import Bbox
+
+    low, high = np.sort([ax.get_xlim(), ax.get_ylim()], axis=1).T
+    view = Bbox([low, high])
+    for line in ax.lines:
+        points = np.asarray(line.get_xydata())
+        marks = line.get_linestyle() in ("None", "none")
+        if not (((points > low) & (points < high)).all(axis=1).any() if marks else
+                len(points) > 1 and line.get_path().intersects_bbox(view, filled=False)):  # fmt: skip
+            line.set_label("_")
+    for drawn in ax.collections:
+        paths = drawn.get_paths()
+        if not str(drawn.get_label()).startswith("_") and not any(path.intersects_bbox(view) for path in paths):
+            drawn.set_label("_")

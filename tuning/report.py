@@ -119,7 +119,8 @@ def _importance(findings: Findings) -> str:
     return html.drawn(figures.importance_figure(findings),
                       "Heat map of how much each constant explains of each objective.",
                       "How much of an objective's variation over the candidates a constant explains by itself, in "
-                      "percent. What a column lacks of 100 comes from constants acting together, and from chance.")
+                      "percent. A column need not add up to 100: what constants explain that the search moved together "
+                      "counts for each of them; what shows only in their interplay counts for none.")  # fmt: skip
 
 
 def _optimism(findings: Findings, held_out: Evaluations | None, held_out_rows: np.ndarray) -> str:

@@ -27,6 +27,7 @@ from scenarios.drawing import (
 from tuning.analysis import judgements
 from tuning.console import UNITS
 from tuning.evaluations import Evaluations
+from tuning.figures import legend_of
 from tuning.findings import BY_HAND, Findings, HypervolumeCurve, Judgement, Member
 from tuning.objectives import RATES, Goals, Statistic, estimate
 from tuning.weights_file import UNITS as CONSTANT_UNITS
@@ -81,6 +82,20 @@ def in_units(statistic: Statistic, value: Any) -> Any:
     return (100.0 if statistic.measure in RATES else 1.0) * np.asarray(value, np.float64) + 0.0
 
 
+def view_of(statistic: Statistic, values: np.ndarray, share: float = 0.12) -> tuple[float, float]:
+    """Ends of an axis that shows the values, in units as shown, with room of that share of their span at each end.
+
+    Rates end where they can: at 0 and 100 %, but for half a marker's width.
+    """
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    room = share * (high - low) or 0.02 * abs(high) or 1.0
+    ends = low - room, high + room
+    if statistic.measure not in RATES:
+        return ends
+    marker = 0.05 * (ends[1] - ends[0])
+    return max(ends[0], -marker), min(ends[1], 100.0 + marker)
+
+
 def front_figure(findings: Findings, training: Evaluations | None = None, numbered: bool = False) -> "Figure":
     """Every pair of objectives: the front, the default constants and the recommended ones, a line from each to its
     value on the held-out suite; all candidates in grey if `training` is given. One objective: by candidate.
@@ -94,14 +109,14 @@ def front_figure(findings: Findings, training: Evaluations | None = None, number
     figure, panels = _panels(len(pairs), height=3.0)
     cloud = candidate_objectives(findings.goals, training) if training is not None else None
     for ax, (across, up) in zip(panels, pairs, strict=True):
+        _show_members(findings, across, up, ax)
         if cloud is not None:
-            ax.plot(cloud[:, across], cloud[:, up], linestyle="none", marker=".", markersize=4, color=GREY, zorder=1,
-                    label="candidate")  # fmt: skip
+            _draw_candidates(cloud[:, [across, up]], ax)
         _draw_members(findings, across, up, ax)
         if numbered:
             _number_members(findings, across, up, ax)
         _label_axes(ax, axis_label(objectives[across]), axis_label(objectives[up]))
-        _show_members(findings, across, up, ax)
+        _mark_rates(ax, objectives[across], objectives[up])
     figure_legend(figure, panels)
     return figure
 
@@ -124,24 +139,32 @@ def telling_objective(findings: Findings) -> int:
     return int(np.argmax(np.nanmax(objectives, axis=0) > np.nanmin(objectives, axis=0)))
 
 
+def line_colours(count: int = 64) -> list[str]:
+    """Of thin lines, from least to most: `COLOURS` without its light end, which is lost on white."""
+    from matplotlib import colormaps
+    from matplotlib.colors import to_hex
+
+    return [to_hex(colour) for colour in colormaps[COLOURS](np.linspace(0.0, 0.68, count))]
+
+
 def parallel_figure(findings: Findings, ax: "Axes | None" = None) -> "Figure":
     """Parallel coordinates: one line a member of the front through its constants and its objectives on training.
 
     Each axis runs over what is shown; the shade is the first objective in which they differ.
     """
     from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import Normalize
+    from matplotlib.colors import ListedColormap, Normalize
 
     names, table = parallel_table(findings)
-    if ax is None:
-        ax = new_figure((max(0.62 * len(names) + 1.6, 5.0), 4.6)).subplots()
+    alone = ax is None
+    ax = new_figure((max(0.62 * len(names) + 1.6, 5.0), 4.6)).subplots() if ax is None else ax
     low, high = np.nanmin(table, axis=0), np.nanmax(table, axis=0)
     lines = np.where(high > low, (table - low) / np.where(high > low, high - low, 1.0), 0.5)
     shade = telling_objective(findings)
     shaded = table[:, len(findings.parameters) + shade]
-    shades = ScalarMappable(Normalize(np.nanmin(shaded), np.nanmax(shaded)), COLOURS)
+    shades = ScalarMappable(Normalize(np.nanmin(shaded), np.nanmax(shaded)), ListedColormap(line_colours()))
     for line, value in zip(lines[:-1], shaded[:-1], strict=True):
-        ax.plot(line, color=shades.to_rgba(value), linewidth=1.2, alpha=0.8, zorder=2)
+        ax.plot(line, color=shades.to_rgba(value), linewidth=1.2, zorder=2)
     ax.plot(lines[-1], color=BLACK, linewidth=1.8, linestyle="--", zorder=3, label="default constants")
     best = lines[findings.choices[findings.recommended].member]
     style: dict[str, Any] = CHOSEN | {"markersize": 9}
@@ -150,7 +173,7 @@ def parallel_figure(findings: Findings, ax: "Axes | None" = None) -> "Figure":
     bar = figure_of(ax).colorbar(shades, ax=ax, pad=0.01, shrink=0.8)
     bar.set_label(axis_label(findings.goals.objectives[shade]), fontsize=FONT)
     bar.ax.tick_params(labelsize=FONT - 1)
-    figure_legend(figure_of(ax), [ax])
+    legend_of(ax, alone)
     return figure_of(ax)
 
 
@@ -194,6 +217,7 @@ def sweep_figure(goals: Goals, training: Evaluations, found: Sequence[Sweep]) ->
             ax.axvline(training.values[0, sweep.parameter], color=BLACK, linestyle="--", linewidth=0.9)
             name = training.parameters[sweep.parameter].replace("_", " ")
             _label_axes(ax, name, name_and_unit(statistic))
+            _mark_rates(ax, None, statistic)
     return figure
 
 
@@ -209,7 +233,10 @@ def hypervolume_figure(curve: HypervolumeCurve, ax: "Axes | None" = None) -> "Fi
 
 
 def importance_figure(findings: Findings, ax: "Axes | None" = None) -> "Figure":
-    """Heat map: share [%] of each objective's variation that each parameter explains by itself."""
+    """Heat map: share [%] of each objective's variation that each parameter explains by itself.
+
+    A column need not add up to 100: what parameters that moved together explain counts for each of them.
+    """
     share, objectives = 100.0 * findings.importance, findings.goals.objectives
     if ax is None:
         ax = new_figure((1.35 * len(objectives) + 2.6, 0.34 * len(share) + 1.5)).subplots()
@@ -269,6 +296,7 @@ def optimism_figure(findings: Findings) -> "Figure":
         ends = np.array([*ax.get_xlim(), *ax.get_ylim()])
         ax.axline((ends.min(), ends.min()), slope=1.0, color=GREY, linestyle="--", linewidth=1.0, zorder=0)
         _label_axes(ax, f"training: {name_and_unit(statistic)}", f"held-out: {name_and_unit(statistic)}")
+        _mark_rates(ax, statistic, statistic)
         ax.set_title(axis_label(statistic).rpartition(", ")[2], fontsize="medium")
     figure_legend(figure, panels)
     return figure
@@ -277,11 +305,11 @@ def optimism_figure(findings: Findings) -> "Figure":
 def agreement_figure(agreement: Mapping[str, np.ndarray], place_name: str = "start",
                      ax: "Axes | None" = None) -> "Figure":
     """Cosine between the surrogate's gradient and the hard planner's at each start, with its 95 % interval, and the
-    share of parameters whose signs agree. cosine, cosine_low, cosine_high, sign_agreement: [S]. place_name: what a
-    start is called.
+    share of parameters whose signs agree, with that of chance. cosine, cosine_low, cosine_high, sign_agreement: [S].
+    place_name: what a start is called.
     """
-    if ax is None:
-        ax = new_figure((6.2, 3.2)).subplots()
+    alone = ax is None
+    ax = new_figure((6.2, 3.2)).subplots() if ax is None else ax
     cosine, low, high, signs = (np.atleast_1d(agreement[name]) for name in
                                 ("cosine", "cosine_low", "cosine_high", "sign_agreement"))  # fmt: skip
     place = np.arange(len(cosine))
@@ -290,10 +318,11 @@ def agreement_figure(agreement: Mapping[str, np.ndarray], place_name: str = "sta
     ax.plot(place + 0.1, signs, linestyle="none", marker="D", markersize=6, markerfacecolor=ORANGE,
             markeredgecolor=BLACK, label="share of signs that agree")  # fmt: skip
     ax.axhline(0.0, color=BLACK, linewidth=0.8, linestyle="--")
+    ax.axhline(0.5, color=ORANGE, linewidth=1.0, linestyle=":", zorder=1, label="signs that agree by chance")
     ax.set(ylim=(-1.05, 1.05), xlim=(-0.5, len(cosine) - 0.5))
-    _label_axes(ax, place_name, "agreement")
+    _label_axes(ax, place_name, "agreement [1]")
     ax.set_xticks(place, [str(index + 1) for index in place])
-    figure_legend(figure_of(ax), [ax])
+    legend_of(ax, alone)
     return figure_of(ax)
 
 
@@ -328,7 +357,9 @@ def _draw_members(findings: Findings, across: int, up: int, ax: "Axes") -> None:
 
 
 def _number_members(findings: Findings, across: int, up: int, ax: "Axes") -> None:
-    """Members at one place share a label; a white rim keeps it apart from what lies under it."""
+    """Members at one place share a label, which lies beside its mark where it hides the least of marks and labels; a
+    white rim keeps it apart from what lies under it, and a line leads to it where it is far.
+    """
     from matplotlib.patheffects import withStroke
 
     statistics = findings.goals.objectives[across], findings.goals.objectives[up]
@@ -336,9 +367,42 @@ def _number_members(findings: Findings, across: int, up: int, ax: "Axes") -> Non
     for number, member in enumerate(findings.front, start=1):
         x, y = _point(member.training, across, up, statistics).tolist()
         numbers.setdefault((x, y), []).append(str(number))
-    for place, there in numbers.items():
-        ax.annotate(", ".join(there), place, xytext=(5, 5), textcoords="offset points", fontsize=FONT - 1, zorder=6,
-                    path_effects=[withStroke(linewidth=2.0, foreground="white")])  # fmt: skip
+    labels = [", ".join(there) for there in numbers.values()]
+    best, default = (_point(one.training, across, up, statistics) for one in (recommended(findings), findings.default))
+    marks = [*((place, 3.0) for place in numbers), (default, 4.5), (best, 7.0)]
+    for place, label, offset in zip(numbers, labels, _label_offsets(list(numbers), labels, marks, ax), strict=True):
+        far = float(np.hypot(*offset)) > 13.0
+        ax.annotate(label, place, xytext=offset, textcoords="offset points", fontsize=FONT - 1, zorder=6, ha="center",
+                    va="center", path_effects=[withStroke(linewidth=2.0, foreground="white")],
+                    arrowprops={"arrowstyle": "-", "color": GREY, "linewidth": 0.6} if far else None)  # fmt: skip
+
+
+def _label_offsets(places: Sequence[tuple[float, float]], labels: Sequence[str],
+                   marks: Sequence[tuple[Any, float]], ax: "Axes") -> list[tuple[float, float]]:
+    """Of each label's middle from its place [pt], one after the other where least is hidden.
+
+    marks: places with half their size [pt].
+    """
+    scale = 72.0 / figure_of(ax).dpi
+    taken = [(*(scale * ax.transData.transform(place)), half, half) for place, half in marks]  # middle, half sizes
+    low, high = scale * np.array(ax.bbox.min), scale * np.array(ax.bbox.max)
+    angles = np.deg2rad([45, 135, -45, -135, 90, 0, 180, -90])
+    found = []
+    for place, label in zip(places, labels, strict=True):
+        middle, half = scale * ax.transData.transform(place), np.array([2.6 * len(label) + 0.5, 4.0])
+        offsets = [(distance + np.array([half[0] - 3.0, 0.0])) * np.array([np.cos(angle), np.sin(angle)])
+                   for distance in (9.0, 12.0, 17.0, 23.0) for angle in angles]  # fmt: skip
+        boxes = np.array(taken)
+        costs = []
+        for offset in offsets:
+            at = middle + offset
+            shared = np.maximum(half + boxes[:, 2:] - np.abs(at - boxes[:, :2]), 0.0)
+            outside = np.maximum(low + half - at, 0.0) + np.maximum(at + half - high, 0.0)
+            costs.append(shared.prod(axis=1).sum() + 40.0 * outside.sum() + 0.2 * np.hypot(*offset))
+        offset = offsets[int(np.argmin(costs))]
+        taken.append((*(middle + offset), *half))
+        found.append((float(offset[0]), float(offset[1])))
+    return found
 
 
 def _draw_held_out(trained: np.ndarray, held_out: np.ndarray, color: str, kind: str, ax: "Axes") -> None:
@@ -360,10 +424,25 @@ def _show_members(findings: Findings, across: int, up: int, ax: "Axes") -> None:
     judgements = [judged for member in (*findings.front, findings.default)
                   for judged in (member.training, member.held_out) if judged is not None]  # fmt: skip
     points = np.array([_point(judged, across, up, statistics) for judged in judgements])
-    for (low, high), limits in zip(zip(np.nanmin(points, axis=0), np.nanmax(points, axis=0), strict=True),
-                                   (ax.set_xlim, ax.set_ylim), strict=True):  # fmt: skip
-        room = 0.12 * (high - low) or 0.02 * abs(high) or 1.0
-        limits(low - room, high + room)
+    for statistic, values, limits in zip(statistics, points.T, (ax.set_xlim, ax.set_ylim), strict=True):
+        limits(*view_of(statistic, values))
+
+
+def _draw_candidates(points: np.ndarray, ax: "Axes") -> None:
+    """Those [W, 2] within the view; one beyond it is left out rather than cut at the frame."""
+    low, high = np.array([ax.get_xlim(), ax.get_ylim()]).T
+    within = ((points >= low) & (points <= high)).all(axis=1)
+    ax.plot(*np.where(within[:, None], points, np.nan).T, linestyle="none", marker=".", markersize=4, color=GREY,
+            zorder=1, clip_on=False, label="candidate")  # fmt: skip
+
+
+def _mark_rates(ax: "Axes", across: Statistic | None, up: Statistic | None) -> None:
+    """No tick below 0 or above 100 % on the axes of rates; call it when the limits are settled. None: no statistic."""
+    for axis, statistic in ((ax.xaxis, across), (ax.yaxis, up)):
+        if statistic is not None and statistic.measure in RATES:
+            low, high = sorted(axis.get_view_interval())
+            ticks = np.asarray(axis.get_major_locator().tick_values(low, high))
+            axis.set_ticks(ticks[(ticks >= max(low, -1e-9)) & (ticks <= min(high, 100.0 + 1e-9))].tolist())
 
 
 def _single_objective(findings: Findings, training: Evaluations | None) -> "Figure":
@@ -383,6 +462,7 @@ def _single_objective(findings: Findings, training: Evaluations | None) -> "Figu
             ends = np.array([member.row, value]), np.array([member.row, held_out])
             _draw_held_out(*ends, style["color"], kind, ax)
     _label_axes(ax, "candidate, in the order asked for", axis_label(statistic))
+    _mark_rates(ax, None, statistic)
     figure_legend(figure_of(ax), [ax])
     return figure_of(ax)
 

@@ -13,14 +13,14 @@ import numpy as np
 from scenarios.drawing import BLACK, BLUE, ORANGE, VERMILLION
 from tuning.evaluations import Evaluations
 from tuning.findings import Findings, Judgement, Member
-from tuning.objectives import Goals
+from tuning.objectives import Goals, Statistic
 from tuning.report_figures import (
-    COLOURS,
     GREY,
     axis_label,
     candidate_objectives,
     front_figure,
     in_units,
+    line_colours,
     measure_name,
     name_and_unit,
     parallel_figure,
@@ -28,6 +28,7 @@ from tuning.report_figures import (
     recommended,
     telling_objective,
     unit_of,
+    view_of,
 )
 
 PLACE = "front-plot"  # id of the plot's element
@@ -57,7 +58,7 @@ def explore_front(findings: Findings, training: Evaluations) -> Any:
 
 def explore_parallel(findings: Findings) -> Any:
     """Parallel coordinates as a plotly figure, in which a range of an axis can be brushed; the first axis is the
-    member's number, 0 the default. Without plotly `parallel_figure`.
+    member's number, at which the recommended one (a star) and the default are named. Without plotly `parallel_figure`.
     """
     if not available():
         return parallel_figure(findings)
@@ -66,9 +67,13 @@ def explore_parallel(findings: Findings) -> Any:
     names, table = parallel_table(findings)
     numbers = [*range(1, len(findings.front) + 1), 0]
     shade = telling_objective(findings)
-    lines = {"color": table[:, len(findings.parameters) + shade], "colorscale": COLOURS, "showscale": True,
+    best = findings.choices[findings.recommended].member + 1
+    named = {0: "default", best: f"★ {best} {findings.picked}"}
+    ticks = sorted(numbers)
+    lines = {"color": table[:, len(findings.parameters) + shade], "colorscale": line_colours(9), "showscale": True,
              "colorbar": {"title": {"text": name_and_unit(findings.goals.objectives[shade]), "side": "right"}}}
-    axes = [{"label": "member", "values": numbers, "tickvals": sorted(numbers)},
+    axes = [{"label": "member", "values": numbers, "tickvals": ticks,
+             "ticktext": [named.get(number, str(number)) for number in ticks]},
             *({"label": name, "values": table[:, index]} for index, name in enumerate(names))]  # fmt: skip
     figure = go.Figure(go.Parcoords(line=lines, dimensions=axes, labelangle=-20))
     figure.update_layout(template="plotly_white", height=460, margin={"l": 60, "r": 20, "t": 110, "b": 30})
@@ -85,12 +90,13 @@ def _figure(findings: Findings, training: Evaluations) -> Any:
     up = min(1, len(findings.goals.objectives) - 1)
     figure = go.Figure([_scatter(name, points, texts, style, up) for name, points, texts, style in traces])
     labels = [axis_label(statistic) for statistic in findings.goals.objectives]
+    ranges = [_range(statistic, traces, index) for index, statistic in enumerate(findings.goals.objectives)]
     figure.update_layout(
         template="plotly_white", height=520, margin={"l": 60, "r": 20, "t": 70, "b": 60}, hovermode="closest",
         paper_bgcolor="white", legend={"orientation": "h", "y": -0.16}, hoverlabel={"align": "left"},
-        xaxis={"title": {"text": labels[0]}, "range": _range(traces, 0)},
-        yaxis={"title": {"text": labels[up]}, "range": _range(traces, up)},
-        updatemenus=[_menu("x", labels, traces, 0, 0.0), _menu("y", labels, traces, up, 0.5)],
+        xaxis={"title": {"text": labels[0]}, "range": ranges[0]},
+        yaxis={"title": {"text": labels[up]}, "range": ranges[up]},
+        updatemenus=[_menu("x", labels, traces, ranges, 0, 0.0), _menu("y", labels, traces, ranges, up, 0.5)],
     )  # fmt: skip
     return figure
 
@@ -132,21 +138,20 @@ def _scatter(name: str, points: np.ndarray, texts: list[str], style: dict[str, A
                       hovertemplate=f"<b>{name}</b><br>%{{text}}<extra></extra>")  # fmt: skip
 
 
-def _menu(axis: str, labels: list[str], traces: list[Any], active: int, place: float) -> dict[str, Any]:
+def _menu(axis: str, labels: list[str], traces: list[Any], ranges: list[list[float]], active: int,
+          place: float) -> dict[str, Any]:
     """A list of objectives for one axis."""
     buttons = [{"label": f"{axis}: {label}", "method": "update",
                 "args": [{axis: [_column(points, index) for _, points, _, _ in traces]},
-                         {f"{axis}axis.title.text": label, f"{axis}axis.range": _range(traces, index)}]}
+                         {f"{axis}axis.title.text": label, f"{axis}axis.range": ranges[index]}]}
                for index, label in enumerate(labels)]  # fmt: skip
     return {"buttons": buttons, "active": active, "x": place, "xanchor": "left", "y": 1.14, "yanchor": "top"}
 
 
-def _range(traces: list[Any], index: int) -> list[float]:
+def _range(statistic: Statistic, traces: list[Any], index: int) -> list[float]:
     """Of an axis: that of the members, as candidates far off would press them into a corner."""
     values = np.concatenate([points[:, index] for _, points, _, _ in traces[1:]])
-    low, high = float(np.nanmin(values)), float(np.nanmax(values))
-    room = 0.1 * (high - low) or 0.02 * abs(high) or 1.0
-    return [low - room, high + room]
+    return list(view_of(statistic, values, share=0.1))
 
 
 def _column(points: np.ndarray, index: int) -> list[float | None]:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from scenarios.drawing import BLACK, BLUE, FONT, ORANGE, SKY, VERMILLION, figure_legend, figure_of, new_figure
+from tuning.figures import legend_of
 from tuning.intervals import mean_interval
 from tuning.search_study import Tradeoff
 from tuning.table1 import PAPER_TABLE, QUANTITIES, PlannedMaps, measured, verdicts
@@ -49,8 +50,8 @@ def verdict_figure(reports: Mapping[str, PlannedMaps], ax: "Axes | None" = None)
     found = {name: verdicts(maps) for name, maps in reports.items()}
     rows = {f"{quantity.partition(' [')[0]}, {name}": found[name][quantity] for quantity in QUANTITIES
             for name in reports}  # fmt: skip
-    if ax is None:
-        ax = new_figure((7.6, 0.33 * len(rows) + 1.3)).subplots()
+    alone = ax is None
+    ax = new_figure((7.6, 0.33 * len(rows) + 1.3)).subplots() if ax is None else ax
     shares = np.array(list(rows.values()))
     left = np.zeros(len(rows))
     for (label, colour, hatch), share in zip(VERDICTS, shares.T, strict=True):
@@ -62,7 +63,7 @@ def verdict_figure(reports: Mapping[str, PlannedMaps], ax: "Axes | None" = None)
     ax.set(xlim=(0, 100))
     ax.set_xlabel("maps [%]", fontsize=FONT)
     ax.tick_params(labelsize=FONT - 1)
-    figure_legend(figure_of(ax), [ax])
+    legend_of(ax, alone)
     return figure_of(ax)
 
 
@@ -97,12 +98,15 @@ def draw_tradeoff(constant: Mapping[float, Tradeoff], shapes: Mapping[str, Trade
     ax.plot(*line.T, color=BLUE, marker="o", markersize=4, zorder=2, label="constant ω")
     for place in _apart(line):
         weight = list(constant)[place]
-        ax.annotate(f"ω = {weight:g}", line[place], textcoords="offset points", xytext=(5, 5), fontsize=FONT - 2)
+        last = line[place, 0] == line[:, 0].max()  # beside it is the frame
+        ax.annotate(f"ω = {weight:g}", line[place], textcoords="offset points", xytext=(0 if last else 5, 5),
+                    ha="center" if last else "left", fontsize=FONT - 2)  # fmt: skip
     for (name, found), marker in zip(shapes.items(), MARKS, strict=False):
         ax.plot(found.expansions[0], found.length[0], marker=marker, markersize=8, markerfacecolor=ORANGE,
                 markeredgecolor=BLACK, linestyle="none", zorder=3, label=name)
     ax.set_xlabel("expansions ÷ those of ω = 1 [1]", fontsize=FONT)
     ax.set_ylabel("path length ÷ that of ω = 1 [1]", fontsize=FONT)
+    ax.margins(0.1)  # room for labels
     ax.tick_params(labelsize=FONT - 1)
     return ax
 

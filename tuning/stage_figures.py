@@ -21,17 +21,15 @@ from scenarios.drawing import (
     ORANGE,
     SKY,
     VERMILLION,
-    draw_ends,
     draw_map,
     draw_movers,
     draw_squares,
     extent,
     figure_of,
     legend_below,
-    map_size,
     new_figure,
 )
-from tuning.figures import disc_centres, draw_outline
+from tuning.figures import disc_centres, draw_ends, draw_outline, draw_used_map, used_map_size
 from tuning.planning import path_length
 from tuning.stages import Densities, Moment
 
@@ -43,12 +41,13 @@ if TYPE_CHECKING:
 MOST_SIGNS = 32  # cells a side up to which a sign is put into each
 AROUND = 2.6  # [m] that is shown of the map to each side of a deciding robot
 REFUSED = "#9A9A9A"
+SCORED = "admissible, by score"
 
 
 def density_figure(scenario: Scenario, found: Densities, cell: tuple[int, int] | None = None, y_down: bool = False,
                    ax: "Axes | None" = None) -> "Figure":
     """P of eq. 2 for every free cell, as a share of Q; the dashed rectangle is that of `cell` (row, col)."""
-    ax = _map_with_bar(scenario.grid, ax, y_down)
+    ax = _map_with_bar(scenario.grid, _ends(scenario), ax, y_down)
     _draw_field(scenario.grid, found.local / max(found.overall, 1e-9), ax, "density to the goal ÷ map's, P/Q [1]")
     draw_ends(scenario.start[:2], scenario.goal, ax)
     if cell is not None:
@@ -60,7 +59,7 @@ def density_figure(scenario: Scenario, found: Densities, cell: tuple[int, int] |
 
 def weight_figure(scenario: Scenario, found: Densities, y_down: bool = False, ax: "Axes | None" = None) -> "Figure":
     """ω of eq. 5 for every free cell; − stands where it is below 1 (dense), + where above (sparse)."""
-    ax = _map_with_bar(scenario.grid, ax, y_down)
+    ax = _map_with_bar(scenario.grid, _ends(scenario), ax, y_down)
     _draw_field(scenario.grid, found.weight, ax, "heuristic weight ω [1]")
     draw_ends(scenario.start[:2], scenario.goal, ax)
     _draw_signs(scenario.grid, found.weight, ax)
@@ -73,14 +72,19 @@ def weight_figure(scenario: Scenario, found: Densities, y_down: bool = False, ax
 
 
 def expansion_figure(grid: Grid, found: SearchResult, name: str = "A*", y_down: bool = False,
-                     ax: "Axes | None" = None) -> "Figure":
-    """Cells coloured by the order in which the search closed them, cells it never closed white, and the grid path."""
-    ax = _map_with_bar(grid, ax, y_down)
-    rows, columns = int(grid.height), int(grid.width)
-    order = np.asarray(found.expanded_at)[:rows, :columns]
-    _draw_field(grid, np.where(order >= 0, order + 1.0, np.nan), ax, "order of expansion [1]")
+                     ax: "Axes | None" = None, most: int | None = None) -> "Figure":
+    """Cells coloured by the order in which the search closed them, cells it never closed white, and the grid path.
+
+    most: expansions at which the colours end, the same for searches that are to be compared; this search's unless
+    given.
+    """
     cells = np.asarray(found.path)[: int(found.path_cells)]
     path = (cells[:, ::-1] + 0.5) * float(grid.resolution) + np.asarray(grid.origin)
+    ax = _map_with_bar(grid, path, ax, y_down)
+    rows, columns = int(grid.height), int(grid.width)
+    order = np.asarray(found.expanded_at)[:rows, :columns]
+    ends = (1.0, float(most)) if most is not None else None
+    _draw_field(grid, np.where(order >= 0, order + 1.0, np.nan), ax, "order of expansion [1]", ends)
     ax.plot(*path.T, color=BLACK, linewidth=2.0, zorder=4, label="grid path")
     if len(path):
         draw_ends(path[0], path[-1], ax)
@@ -131,6 +135,7 @@ def draw_candidates(scenario: Scenario, moment: Moment, robot: RobotLimits, ax: 
     admissible = f"{int(moment.admissible.sum())} of {moment.admissible.size} candidates admissible"
     ax.set_title(f"{moment.time:.1f} s: {admissible}", fontsize=FONT)
     legend_below(ax)
+    _colour_entry(ax.get_legend(), SCORED)
     return ax
 
 
@@ -183,17 +188,25 @@ def draw_terms(moment: Moment, ax: "Axes | None" = None) -> "Axes":
     return ax
 
 
-def _map_with_bar(grid: Grid, ax: "Axes | None", y_down: bool) -> "Axes":
-    """The map's axes; those made here leave room for a bar of colours beside it."""
-    width, height = map_size(grid)
-    return draw_map(grid, ax if ax is not None else new_figure((width + 1.1, height - 0.2)).subplots(), y_down)
+def _ends(scenario: Scenario) -> np.ndarray:
+    """[2, 2] (x, y) [m]: start and goal."""
+    return np.stack([np.asarray(scenario.start)[:2], np.asarray(scenario.goal)])
 
 
-def _draw_field(grid: Grid, values: np.ndarray, ax: "Axes", label: str) -> None:
-    """Values [H, W] over the free cells, none where NaN, with a bar of colours."""
+def _map_with_bar(grid: Grid, points: np.ndarray, ax: "Axes | None", y_down: bool) -> "Axes":
+    """The map's axes, with points [N, 2] (x, y) [m]; those made here leave room for a bar of colours beside it."""
+    width, height = used_map_size(grid, points)
+    ax = ax if ax is not None else new_figure((width + 1.1, height - 0.2)).subplots()
+    return draw_used_map(grid, points, ax, y_down)
+
+
+def _draw_field(grid: Grid, values: np.ndarray, ax: "Axes", label: str,
+                ends: tuple[float, float] | None = None) -> None:
+    """Values [H, W] over the free cells, none where NaN, with a bar of colours between `ends`, or the values' own."""
     shown = np.ma.masked_where(_occupied(grid) | ~np.isfinite(values), values)
-    image = ax.imshow(shown, cmap=_light_to_dark(), origin="lower", extent=extent(grid), interpolation="nearest",
-                      aspect=ax.get_aspect(), zorder=0.5)
+    least, most = ends if ends is not None else (None, None)
+    image = ax.imshow(shown, cmap=_light_to_dark(), vmin=least, vmax=most, origin="lower", extent=extent(grid),
+                      interpolation="nearest", aspect=ax.get_aspect(), zorder=0.5)
     _draw_bar(image, ax, label)
 
 
@@ -269,12 +282,19 @@ def _draw_scored(moment: Moment, ax: "Axes") -> None:
     if len(lines):
         rising = np.argsort(score)
         drawn = LineCollection(list(lines[rising]), array=score[rising], cmap=_light_to_dark(), linewidths=1.2,
-                               zorder=5, label="admissible, by score")  # fmt: skip
+                               zorder=5, label=SCORED)  # fmt: skip
         ax.add_collection(drawn, autolim=False)
     if moment.chosen:
         rim = [withStroke(linewidth=4.6, foreground="white")]  # or it would be one among many in grey
         ax.plot(*moment.arcs[:, *moment.chosen].T, color=VERMILLION, linewidth=2.6, zorder=6, label="chosen",
                 path_effects=rim)
+
+
+def _colour_entry(legend: Any, label: str) -> None:
+    """A line of many colours stands in the legend in the middle one of them."""
+    for text, handle in zip(legend.get_texts(), legend.legend_handles, strict=True):
+        if text.get_text() == label:
+            handle.set_color(_light_to_dark()(0.5))
 
 
 def _occupied(grid: Grid) -> np.ndarray:

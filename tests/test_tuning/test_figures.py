@@ -18,12 +18,13 @@ from adwa_jax.plan import Plan
 from adwa_jax.presets import jackal
 from adwa_jax.rollout import RobotState
 from adwa_jax.route import Route
-from scenarios.drawing import ORANGE
+from scenarios.drawing import ORANGE, new_figure
 from scenarios.generators import toy
 from scenarios.generators.assembly import grid_of
 from tuning import animation
 from tuning.animation import animate_drive
 from tuning.figures import (
+    MARGIN,
     Comparison,
     compare_drives,
     compare_plans,
@@ -159,6 +160,28 @@ def test_a_plan_without_a_path_says_why():
     for ax in (plan_figure(GRID, lost).axes[0], *compare_plans([Comparison("", GRID, lost, lost)]).axes):
         assert ax.get_title().endswith("no path: UNREACHABLE")
         assert the(ax, "start").get_xydata().tolist() == [[0.5, 0.5]]
+
+
+def test_a_wide_margin_of_obstacles_is_cropped_but_no_end_or_path():
+    occupied = np.ones((60, 80), bool)
+    occupied[20:30, 30:50] = False
+    grid = grid_of(occupied, 0.5, (-1.0, 2.0))
+    within = planned(np.array([[22, 35], [22, 36]]), np.array([[22, 35], [22, 36]]))
+    path = within.path * 0.5 + np.float32([-1.0, 2.0])
+    within = replace(within, start=tuple(path[0]), goal=tuple(path[1]), path=path, key_points=path)
+    ax = plan_figure(grid, within).axes[0]
+    assert ax.get_xlim() == (-1 + 0.5 * (30 - MARGIN), -1 + 0.5 * (50 + MARGIN))
+    assert ax.get_ylim() == (2 + 0.5 * (20 - MARGIN), 2 + 0.5 * (30 + MARGIN))
+    assert plan_figure(grid, within, y_down=True).axes[0].get_ylim() == ax.get_ylim()[::-1]
+    left, right = plan_figure(grid, replace(within, goal=(1.0, 13.0))).axes[0].get_xlim()
+    assert left < 1.0
+    assert right == ax.get_xlim()[1]
+
+
+def test_the_goal_lies_below_key_points_and_danger_points_near_it():
+    for found, label in ((TRADITIONAL, "danger point"), (IMPROVED, "key point")):
+        ax = plan_figure(GRID, found).axes[0]
+        assert the(ax, "grid path").get_zorder() < the(ax, "goal").get_zorder() < the(ax, label).get_zorder()
 
 
 def test_a_map_that_counts_rows_downwards_is_drawn_so():
@@ -349,3 +372,18 @@ def test_arrays_of_jax_are_drawn_as_those_of_numpy():
     on_device = jax.tree.map(jnp.asarray, (SCENARIO, trace_of()))
     ax = drive_figure(on_device[0], PLAN, episode_of(Outcome.STUCK), on_device[1]).axes[0]
     assert the(ax, "robot, end").get_xydata().tolist() == [[1.5, 1.5]]
+
+
+def test_figures_drawn_on_given_axes_keep_their_legends_apart_and_below_their_own_labels():
+    figure = new_figure((9.0, 6.0))
+    axes = figure.subplots(2, 2)
+    results = {"a": results_of(Outcome.REACHED, Outcome.STUCK, Outcome.HIT_MOVER), "b": results_of(Outcome.TIMEOUT)}
+    for ax in axes[0]:
+        outcome_figure(results, ax)
+    for ax in axes[1]:
+        success_figure({"15": (171, 200), "25": (200, 200)}, ax=ax)
+    figure.draw_without_rendering()
+    assert not figure.legends
+    legends = [ax.get_legend().get_window_extent() for ax in axes.flat]
+    plots = [ax.get_window_extent() for ax in axes.flat] + [ax.xaxis.get_tightbbox() for ax in axes.flat]
+    assert not any(one.overlaps(other) for k, one in enumerate(legends) for other in (*legends[k + 1 :], *plots))

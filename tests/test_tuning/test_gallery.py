@@ -9,6 +9,7 @@ from PIL import Image
 from adwa_jax.episode import Outcome
 from adwa_jax.presets import jackal, paper
 from adwa_jax.rollout import RobotState
+from adwa_jax.scenario import UnknownSquares
 from tests.test_tuning.worlds import mixed_suite, part_of
 from tuning import gallery
 from tuning.evaluate import evaluate
@@ -158,3 +159,31 @@ def test_movers_have_trails_and_arrows(replayed):
     (arrows,) = (drawn for drawn in ax.collections if type(drawn).__name__ == "Quiver")
     speeds = np.hypot(arrows.U, arrows.V)
     assert speeds == pytest.approx([0.5, 0.5])  # one second's way of the two movers drawn
+
+
+def test_the_legend_lists_what_is_in_view_only(replayed):
+    driven = replayed["detour"]
+    figure = sheet(Cause.TIMEOUT, Group([0], [driven]), SUITE)
+    (ax,) = figure.axes[:1]
+    low, high = np.sort([ax.get_xlim(), ax.get_ylim()], axis=1).T
+    listed = [text.get_text() for text in figure.legends[0].get_texts()]
+    ends = {"start": np.asarray(driven.scenario.start)[:2], "goal": np.asarray(driven.scenario.goal)}
+    within = {name: bool(((place > low) & (place < high)).all()) for name, place in ends.items()}
+    assert {name: name in listed for name in ends} == within
+    assert not all(within.values())
+    assert {"driven path", "robot, end"} <= set(listed)
+
+
+def test_squares_beyond_the_view_are_neither_drawn_nor_listed(replayed):
+    driven = replayed["detour"]
+    squares = UnknownSquares(np.float32([[-50.0, -50.0]]), np.float32([0.3]), np.float32([0.0]), np.array([True]))
+    far = replace(driven, scenario=replace(driven.scenario, squares=squares))
+    figure = sheet(Cause.TIMEOUT, Group([0], [far]), SUITE)
+    assert not {text.get_text() for text in figure.legends[0].get_texts()} & {"unknown square", "square never sensed"}
+
+
+@pytest.mark.parametrize(("count", "rows", "columns"), [(3, 1, 3), (5, 2, 3), (6, 2, 3), (9, 3, 3), (12, 3, 4)])
+def test_the_last_row_of_a_sheet_is_filled_where_it_can_be(count, rows, columns, replayed):
+    figure = sheet(Cause.NO_PATH, Group([2] * count, [replayed["walled"]] * count), SUITE)
+    layout = figure.axes[0].get_subplotspec().get_gridspec()
+    assert (layout.nrows, layout.ncols) == (rows, columns)

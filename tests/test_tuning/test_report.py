@@ -117,6 +117,7 @@ def test_with_plotly_a_point_names_its_member_and_axes_can_be_brushed():
         "member 2", "member 3", "member 1"]  # fmt: skip
     (lines,) = report_interactive.explore_parallel(findings()).data
     assert list(lines.dimensions[0]["values"]) == [1, 2, 3, 0]
+    assert list(lines.dimensions[0].ticktext) == ["default", "★ 1 recommended", "2", "3"]
     assert list(lines.dimensions[1]["values"]) == [*VALUES[[4, 5, 6, 0], 0]]
     assert lines.dimensions[4].label == "success rate [%]"
 

@@ -16,12 +16,14 @@ from tuning.report_figures import (
     hypervolume_figure,
     importance_figure,
     in_units,
+    line_colours,
     optimism_figure,
     parallel_figure,
     parallel_table,
     stability_figure,
     sweep_figure,
     sweeps,
+    view_of,
 )
 
 
@@ -64,11 +66,55 @@ def test_without_held_out_and_candidates_the_front_stands_alone():
     assert {line.get_label() for line in drawn.lines} == {"front", "default constants", "recommended"}
 
 
+def test_rates_are_marked_up_to_100_percent_and_their_axes_end_there_but_for_a_marker():
+    for rates in ([0.0, 100.0], [96.0, 100.0], [100.0, 100.0], [99.7, 99.9]):
+        low, high = view_of(Statistic("success", "max"), np.array(rates))
+        assert low <= min(rates)
+        assert max(rates) < high < 100 + 0.1 * (high - low)
+    found = findings()
+    best = found.default.training.objectives
+    objectives = (best[0]._replace(value=1.0), *best[1:])
+    perfect = replace(found.default, training=replace(found.default.training, objectives=objectives))
+    for ax in front_figure(replace(found, default=perfect)).axes[:3]:
+        assert ax.get_xlim()[1] > 100
+        assert 95 < max(ax.get_xticks()) <= 100
+
+
+def test_candidates_beyond_the_view_are_left_out_and_those_within_are_whole(training):
+    values = training.columns["length_ratio"].copy()
+    values[3] += 9.0
+    strayed = replace(training, columns=training.columns | {"length_ratio": values})
+    for ax in front_figure(findings(), strayed).axes:
+        (drawn,) = [line for line in ax.lines if line.get_label() == "candidate"]
+        points = drawn.get_xydata()[np.isfinite(drawn.get_xydata()).all(axis=1)]
+        low, high = np.array([ax.get_xlim(), ax.get_ylim()]).T
+        assert len(points)
+        assert ((points >= low) & (points <= high)).all()
+        assert not drawn.get_clip_on()
+
+
+def test_the_lines_of_members_are_dark_enough_for_white_paper():
+    channels = np.array([[int(colour[place : place + 2], 16) for place in (1, 3, 5)] for colour in line_colours()])
+    lightness = channels @ [0.299, 0.587, 0.114] / 255
+    assert lightness.max() < 0.65
+    assert (np.diff(lightness) > -0.01).all()
+
+
 def test_numbered_members_carry_the_numbers_of_the_tables():
     found = findings()
     twins = replace(found, front=(*found.front, found.front[0]))
     for ax in front_figure(twins, numbered=True).axes:
         assert [text.get_text() for text in ax.texts] == ["1, 4", "2", "3"]
+
+
+def test_members_numbers_hide_neither_each_other_nor_the_star_and_the_square():
+    figure = front_figure(findings(held_out=False), numbered=True)
+    figure.draw_without_rendering()
+    for ax in figure.axes:
+        texts = [text.get_window_extent() for text in ax.texts]
+        marks = [ax.transData.transform(drawn_points(ax, label)[0]) for label in ("recommended", "default constants")]
+        assert not any(one.overlaps(other) for k, one in enumerate(texts) for other in texts[k + 1 :])
+        assert not any(text.contains(*mark) for text in texts for mark in marks)
 
 
 def test_a_member_chosen_by_hand_is_drawn_as_chosen():
@@ -191,6 +237,9 @@ def test_agreement_has_a_place_a_start():
     assert [tick.get_text() for tick in ax.get_xticklabels()] == ["1", "2", "3"]
     (signs,) = [line for line in ax.lines if line.get_label() == "share of signs that agree"]
     np.testing.assert_allclose(signs.get_ydata(), 2 / 3)
+    (chance,) = [line for line in ax.lines if line.get_label() == "signs that agree by chance"]
+    assert set(chance.get_ydata()) == {0.5}
+    assert ax.get_ylabel() == "agreement [1]"
 
 
 def test_what_is_not_known_is_drawn_as_nothing_rather_than_refused():
@@ -199,3 +248,17 @@ def test_what_is_not_known_is_drawn_as_nothing_rather_than_refused():
     figure = importance_figure(type(found)(**vars(found) | {"importance": nan}))
     assert {text.get_text() for text in figure.axes[0].texts} == {"–"}
     assert isinstance(optimism_figure(found), Figure)
+
+
+def test_figures_drawn_on_given_axes_keep_their_legends_apart_and_below_their_own_labels():
+    figure = new_figure((12.0, 8.0))
+    axes = figure.subplots(2, 2)
+    for ax in axes[0]:
+        parallel_figure(findings(), ax)
+    for ax in axes[1]:
+        agreement_figure(agreement(3), ax=ax)
+    figure.draw_without_rendering()
+    assert not figure.legends
+    legends = [ax.get_legend().get_window_extent() for ax in axes.flat]
+    plots = [ax.get_window_extent() for ax in axes.flat] + [ax.xaxis.get_tightbbox() for ax in axes.flat]
+    assert not any(one.overlaps(other) for k, one in enumerate(legends) for other in (*legends[k + 1 :], *plots))

@@ -58,6 +58,15 @@ def test_labels_that_would_run_into_each_other_are_left_out():
     assert {text.get_text() for text in ax.texts} == {"ω = 0", "ω = 1", "ω = 2"}
 
 
+def test_labels_stay_within_the_frame():
+    ax = draw_tradeoff(CONSTANT, SHAPES)
+    ax.figure.draw_without_rendering()
+    frame = ax.get_window_extent()
+    boxes = np.array([text.get_window_extent().extents for text in ax.texts])
+    assert (boxes[:, :2] > (frame.x0, frame.y0)).all()
+    assert (boxes[:, 2:] < (frame.x1, frame.y1)).all()
+
+
 def test_axes_that_are_given_are_drawn_on():
     axes = new_figure((6.0, 6.0)).subplots(3, 3)
     table1_figure({25: MAPS}, axes[0])

@@ -93,6 +93,14 @@ def test_expansions_are_numbered_from_1_and_the_rest_is_white():
     assert figure.axes[0].get_title() == "mine: 3 of 10 free cells expanded, path 4.41 m"
 
 
+def test_searches_to_be_compared_have_one_scale():
+    order = np.full((3, 4), -1)
+    order[2, 0], order[2, 1] = 0, 1
+    found = search_of(np.array([[2, 0], [2, 1]]), order)
+    assert expansion_figure(SCENARIO.grid, found, most=9).axes[0].images[1].get_clim() == (1.0, 9.0)
+    assert expansion_figure(SCENARIO.grid, found).axes[0].images[1].get_clim() == (1.0, 2.0)
+
+
 def test_candidates_are_coloured_by_score_with_the_best_on_top():
     ax = draw_candidates(SCENARIO, moment_of(), ROBOT)
     arcs = {lines.get_label(): lines for lines in ax.collections if isinstance(lines, LineCollection)}
@@ -101,6 +109,14 @@ def test_candidates_are_coloured_by_score_with_the_best_on_top():
     assert len(arcs["inadmissible"].get_segments()) == 1
     np.testing.assert_allclose(the(ax, "chosen").get_xydata(), moment_of().arcs[:, 1, 0])
     assert ax.get_title() == "1.5 s: 3 of 4 candidates admissible"
+
+
+def test_the_legend_shows_scored_candidates_in_a_colour_that_they_have():
+    ax = draw_candidates(SCENARIO, moment_of(), ROBOT)
+    (entry,) = [handle for handle, label in zip(ax.get_legend().legend_handles, labels(ax), strict=True)
+                if label == "admissible, by score"]  # fmt: skip
+    (drawn,) = [lines for lines in ax.collections if lines.get_label() == "admissible, by score"]
+    assert entry.get_color() == drawn.get_cmap()(0.5)
 
 
 def test_robot_and_movers_are_drawn_to_scale_and_movers_also_where_they_are_expected():
