@@ -73,7 +73,7 @@ def test_where_plans_are_all_that_matters_nothing_is_driven(tmp_path):
     other = "[parameters.sparse_base]\nlow = 1.0\nhigh = 3.0"
     text = JOB.replace("[parameters.clearance]\nlow = 0.02\nhigh = 0.5", other)
     goals = '[[objectives]]\nmeasure = "expansions"\ndirection = "min"\n'
-    file = written(tmp_path, text.replace("[parameters.velocity]", f"{goals}[parameters.velocity]"))
+    file = written(tmp_path, text.replace("[parameters.velocity]", f"{goals}[parameters.sparse_gain]"))
     findings = run_job(file, tmp_path / "out", quiet=True)
     training = as_evaluations(tmp_path / "out" / "training.zarr")
     assert training.done.all()
@@ -307,7 +307,15 @@ def test_a_damaged_environment_is_one_line(whole, tmp_path, content):
     folder = tmp_path / "copy"
     shutil.copytree(whole, folder)
     (folder / "environment.json").write_text(content)
-    with pytest.raises(InputError, match="no job"):
+    with pytest.raises(InputError, match=r"environment\.json: damaged or missing \(.*\); .*; restore it, or"):
+        resume_job(folder, quiet=True)
+
+
+def test_a_job_without_its_file_is_not_taken_for_none(whole, tmp_path):
+    folder = tmp_path / "copy"
+    shutil.copytree(whole, folder)
+    (folder / "job.toml").unlink()
+    with pytest.raises(InputError, match=r"job\.toml is missing; .*; put the job's file back"):
         resume_job(folder, quiet=True)
 
 
