@@ -13,6 +13,7 @@ from pymoo.core.problem import Problem as Bounds
 from pymoo.core.termination import NoTermination
 from pymoo.operators.crossover.sbx import SBX
 from pymoo.operators.mutation.pm import PM
+from pymoo.operators.selection.tournament import TournamentSelection
 from pymoo.problems.static import StaticProblem
 from pymoo.util.ref_dirs import get_reference_directions
 
@@ -72,9 +73,17 @@ def _algorithm(problem: Problem, population: int, settings: Settings) -> Algorit
         sampling=_first(problem, population),  # pyright: ignore[reportArgumentType]
         crossover=SBX(eta=settings.crossover_eta, prob=1.0),
         mutation=PM(eta=settings.mutation_eta),
+        selection=TournamentSelection(func_comp=_less_loss),
     )
     bounds = Bounds(n_var=dimensions, n_obj=objectives, n_ieq_constr=1, xl=0.0, xu=1.0)
     return algorithm.setup(bounds, termination=NoTermination(), seed=problem.seed)
+
+
+def _less_loss(population: Population, pairs: np.ndarray, random_state: np.random.Generator, **_: object) -> np.ndarray:
+    """[P, 1] the better of each pair, by lot among equals. pymoo's own draws some of these lots without the seed."""
+    loss = np.ravel(population.get("CV"))
+    winners = [random_state.choice([a, b]) if loss[a] == loss[b] else (a if loss[a] < loss[b] else b) for a, b in pairs]
+    return np.array(winners, np.int64)[:, None]
 
 
 def _first(problem: Problem, population: int) -> np.ndarray:

@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from tests.test_tuning.test_methods.problems import cube, dtlz2, problem, searched, walled_sphere
+from tests.test_tuning.test_methods.problems import cube, dtlz2, nothing_allowed, problem, searched, walled_sphere
 from tuning.methods.nsga3 import Settings, nsga3
 from tuning.methods.sobol import sobol
 
@@ -65,3 +65,8 @@ def test_margins_of_a_default_that_violates_a_constraint_mean_nothing():
 
     asked = [searched(nsga3, problem(8, 4, 128, within_margins=within), judge) for within in (True, False)]
     np.testing.assert_array_equal(*map(np.concatenate, asked))
+
+
+def test_the_same_scores_give_the_same_candidates_where_all_violate_alike_too():
+    first, second = (np.concatenate(searched(nsga3, problem(5, 4, 160), nothing_allowed)) for _ in range(2))
+    np.testing.assert_array_equal(first, second)
