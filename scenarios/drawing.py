@@ -174,8 +174,8 @@ def draw_mover_ways(ways: np.ndarray, ax: "Axes", heads: bool = True) -> list[An
 
 
 def draw_ends(start: ArrayLike, goal: ArrayLike, ax: "Axes") -> None:
-    """Start and goal, (x, y) [m]; NaN is not drawn."""
-    marker = {"linestyle": "none", "markeredgecolor": BLACK, "zorder": 8}
+    """Start and goal, (x, y) [m], below key points and danger points that lie near them; NaN is not drawn."""
+    marker = {"linestyle": "none", "markeredgecolor": BLACK, "zorder": 6.3}
     ax.plot(*np.reshape(start, (2, 1)), marker="o", markersize=8, markerfacecolor=GREEN, label="start", **marker)
     ax.plot(*np.reshape(goal, (2, 1)), marker="*", markersize=13, markerfacecolor=VERMILLION, label="goal", **marker)
 

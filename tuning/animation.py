@@ -22,6 +22,7 @@ from scenarios.drawing import (
     PURPLE,
     SKY,
     VERMILLION,
+    draw_ends,
     draw_squares,
     new_figure,
 )
@@ -30,7 +31,6 @@ from tuning.figures import (
     COLLISIONS,
     SENTENCES,
     disc_centres,
-    draw_ends,
     draw_hidden_cells,
     draw_last_route,
     draw_outline,

@@ -58,6 +58,7 @@ from tuning.outputs import ANIMATIONS, PICTURES, STDOUT, check_file, check_folde
 from tuning.planning import PlannedPath, as_json, plan_paths, planner_constants, planner_options, why_blocked
 from tuning.results import Results
 from tuning.sources import Source, Work, options_named, read_grid, read_queries, read_suite
+from tuning.start import INTERRUPTED
 from tuning.suite_files import KINDS, suite_in
 from tuning.tune_cli import tune_app
 from tuning.weights_file import load_weight_rule, parse_weight_rule, weights_text
@@ -70,7 +71,7 @@ suite_app = typer.Typer(help="Write suites of scenarios to a file, and picture t
 app.add_typer(suite_app, name="suite")
 app.add_typer(tune_app, name="tune")
 
-FOUND_NOTHING, BAD_INPUT, INTERRUPTED = 1, 2, 130
+FOUND_NOTHING, BAD_INPUT = 1, 2
 LARGEST_RADIUS = 1e6  # [m]
 
 

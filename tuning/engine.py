@@ -217,9 +217,9 @@ def _work(queue: _Queue, options: Options, width: int, table: Table) -> None:
     """One worker: keep `width` lanes busy until the queue is empty and the last of them has ended."""
     lanes: Lanes | None = None
     held: dict[int, _Held] = {}  # by lane
+    at_once = max(FILLED_AT_ONCE, width // 8)
     while True:
         free = [lane for lane in range(width) if lane not in held]
-        at_once = max(FILLED_AT_ONCE, width // 8)
         for start in range(0, len(free), at_once):
             places = free[start : start + at_once]
             taken = queue.take(len(places))

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from numpy.typing import ArrayLike
 
 from adwa_jax.astar import Status
 from adwa_jax.episode import Episode, Outcome
@@ -22,7 +21,6 @@ from adwa_jax.metrics import danger_corners, danger_steps
 from adwa_jax.plan import Plan
 from adwa_jax.scenario import Scenario
 from adwa_jax.window import RobotLimits
-from scenarios import drawing
 from scenarios.drawing import (
     BLACK,
     BLUE,
@@ -33,6 +31,7 @@ from scenarios.drawing import (
     PURPLE,
     SKY,
     VERMILLION,
+    draw_ends,
     draw_hidden,
     draw_map,
     draw_mover_ways,
@@ -360,13 +359,6 @@ def drive_points(scenario: Scenario, plan: Plan, trace: Trace) -> np.ndarray:
         driven_path(scenario, trace),
         np.asarray(trace.route.points)[: int(trace.route.count)],
     ])  # fmt: skip
-
-
-def draw_ends(start: ArrayLike, goal: ArrayLike, ax: "Axes") -> None:
-    """Start and goal, (x, y) [m], below key points and danger points that lie near them; NaN is not drawn."""
-    drawing.draw_ends(start, goal, ax)
-    for end in ax.lines[-2:]:
-        end.set_zorder(6.3)
 
 
 def draw_polyline(key_points: np.ndarray, ax: "Axes", linestyle: str, label: str = "key-point path") -> None:

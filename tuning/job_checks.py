@@ -23,12 +23,10 @@ from tuning.sources import read_suite
 from tuning.space import Parameter, Space, tunable
 from tuning.store import FIGURES, TILE_WIDTH
 from tuning.suite_files import DEFAULT_COUNT
-from tuning.weights_file import COUNTS, RULE
+from tuning.weights_file import COUNTS, OF_A_PLAN
 
 MOST = {"success": 1.0, "collision": 1.0, "hit_while_stopped": 1.0, "spl": 1.0, "barn_score": 0.5}
 """Measures that have an upper bound."""
-OF_A_PLAN = (*RULE, "clearance_margin")
-"""Constants that a plan depends on."""
 SIGNED = ("least_clearance", "mean_clearance")  # all others are 0 at least
 Progress = Callable[[int, int], None]
 

@@ -10,10 +10,9 @@ import numpy as np
 
 from adwa_jax.episode import Outcome
 from adwa_jax.scenario import Scenario
-from scenarios.drawing import BLACK, BLUE, FONT, OCCUPIED, draw_movers
+from scenarios.drawing import BLACK, BLUE, FONT, OCCUPIED, draw_ends, draw_movers
 from tuning.figures import (
     disc_centres,
-    draw_ends,
     draw_hidden_cells,
     draw_last_route,
     draw_outline,

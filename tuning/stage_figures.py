@@ -21,6 +21,7 @@ from scenarios.drawing import (
     ORANGE,
     SKY,
     VERMILLION,
+    draw_ends,
     draw_map,
     draw_movers,
     draw_squares,
@@ -29,7 +30,7 @@ from scenarios.drawing import (
     legend_below,
     new_figure,
 )
-from tuning.figures import disc_centres, draw_ends, draw_outline, draw_used_map, used_map_size
+from tuning.figures import disc_centres, draw_outline, draw_used_map, used_map_size
 from tuning.planning import path_length
 from tuning.stages import Densities, Moment
 

@@ -16,11 +16,11 @@ from tuning.findings import Findings
 from tuning.job_folder import JOB, environment_of, events_of, holder, home_of
 from tuning.options import QuietOption
 from tuning.outputs import check_folder
+from tuning.start import INTERRUPTED
 
 tune_app = typer.Typer(help="Tune constants: jobs that go on after a kill and end in a report.")
 JobArgument = Annotated[Path, typer.Argument(metavar="JOB", help="The job file, TOML.")]
 FolderArgument = Annotated[Path, typer.Argument(metavar="DIR", help="The folder of a job.")]
-INTERRUPTED = 130  # exit code
 TOLD = {"generation": {"generation": int, "spent": int, "best": dict}, "block": {"seconds": float, "episodes": int}}
 RECENT = 20  # blocks of episodes, by which speed is told
 

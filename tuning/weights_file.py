@@ -35,6 +35,7 @@ from scenarios.formats.reading import bad_input, read_toml, shown
 
 SCORE = tuple(field.name for field in fields(ScoreWeights))
 RULE = tuple(field.name for field in fields(WeightRule))
+OF_A_PLAN = (*RULE, "clearance_margin")  # what a plan depends on
 BEHAVIOUR = ("clearance_cap", "clearance_margin", "static_margin", "mover_margin", "mover_growth", "mover_cap",
              "lookahead", "route_margin")  # fmt: skip
 # Counts of `DwaOptions`, each with its range: another value compiles anew, and a decision's cost grows with all three.

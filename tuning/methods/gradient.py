@@ -28,10 +28,7 @@ from tuning.objectives import Goals, Scores
 from tuning.planned_losses import planned_losses, planned_measures
 from tuning.space import Space
 from tuning.surrogate import Look, driven, record, surrogate
-from tuning.weights_file import COUNTS, RULE
-
-PLANNED = (*RULE, "clearance_margin")
-"""Parameters with a smoothed gradient."""
+from tuning.weights_file import COUNTS, OF_A_PLAN
 
 ARRIVES = Loss(1.0, 0.0, 0.0, 0.0, 1.0)
 KEEPS_AWAY = Loss(1.0, 0.0, 0.8, 0.0, 1.0)
@@ -201,7 +198,7 @@ def _smoothed(problem: Problem, settings: Settings, points: np.ndarray, weights:
               random: np.random.Generator) -> np.ndarray:
     """[B, S, D] smoothed gradients in the parameters that only planning depends on; 0 in the others."""
     names = problem.space.names
-    if not any(name in PLANNED for name in names):
+    if not any(name in OF_A_PLAN for name in names):
         return np.zeros((len(points), len(scenarios), len(names)))
     return np.stack([planned_slopes(problem.space, problem.goals, point, row, scenarios, settings.es_pairs,
                                     settings.es_scale, random)
@@ -211,7 +208,7 @@ def _smoothed(problem: Problem, settings: Settings, points: np.ndarray, weights:
 def planned_slopes(space: Space, goals: Goals, point: np.ndarray, weights: np.ndarray, scenarios: list, pairs: int,
                    scale: float, random: np.random.Generator) -> np.ndarray:
     """[S, D] smoothed gradient of the planned paths' loss, by scenario, at a point [D]; weights: [O]."""
-    free = np.array([name in PLANNED for name in space.names])
+    free = np.array([name in OF_A_PLAN for name in space.names])
     probes = probes_about(point, free, pairs, scale, random)
     signed = {statistic.measure: statistic.sign * float(weight)
               for statistic, weight in zip(goals.objectives, weights, strict=True)}  # fmt: skip
@@ -220,7 +217,7 @@ def planned_slopes(space: Space, goals: Goals, point: np.ndarray, weights: np.nd
 
 def _remember_agreement(problem: Problem, settings: Settings, points: np.ndarray, weights: np.ndarray,
                         each: np.ndarray, hard: np.ndarray) -> None:
-    informed = np.array([driven(name) or name in PLANNED for name in problem.space.names])
+    informed = np.array([driven(name) or name in OF_A_PLAN for name in problem.space.names])
     soft = np.stack([mean_slopes(one, settings.resamples, np.random.default_rng([problem.seed, place]))
                      for place, one in enumerate(each)])  # fmt: skip
 
