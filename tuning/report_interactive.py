@@ -4,9 +4,10 @@ Needs plotly, the `report` extra; a report has all of it inlined, so that the pa
 """
 
 import json
+from collections.abc import Sequence
 from html import escape
 from importlib.util import find_spec
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,12 +19,10 @@ from tuning.report_figures import (
     GREY,
     axis_label,
     candidate_objectives,
-    front_figure,
     in_units,
     line_colours,
     measure_name,
     name_and_unit,
-    parallel_figure,
     parallel_table,
     recommended,
     telling_objective,
@@ -43,25 +42,37 @@ def interactive_front(findings: Findings, training: Evaluations) -> tuple[str, s
     """The plot's element, and the scripts that fill it, which belong to the end of the page."""
     from plotly.offline import get_plotlyjs
 
-    figure = _figure(findings, training).to_json().replace("<", "\\u003c")  # no tag ends the script
+    figure = front_plot(findings, training).to_json().replace("<", "\\u003c")  # no tag ends the script
     element = f'<div class="plot" id="{PLACE}" role="img" aria-label="Interactive scatter plot of the front"></div>'
     fill = f'{{ const figure = {figure}; Plotly.newPlot("{PLACE}", figure.data, figure.layout, {json.dumps(CONFIG)}) }}'
     return element, f"<script>{get_plotlyjs()}</script>\n<script>{fill}</script>"
 
 
-def explore_front(findings: Findings, training: Evaluations) -> Any:
-    """A plotly figure: choose its axes, point at a member for its number and constants. Without plotly `front_figure`
-    with the members' numbers.
+def front_plot(findings: Findings, training: Evaluations) -> Any:
+    """A plotly figure: choose its axes, point at a member for its number and constants. A point's `customdata` is its
+    member's number, 0 for the default, −1 for other candidates.
     """
-    return _figure(findings, training) if available() else front_figure(findings, training, numbered=True)
+    import plotly.graph_objects as go
+
+    kinds = _kinds(findings, training)
+    up = min(1, len(findings.goals.objectives) - 1)
+    figure = go.Figure([_scatter(kind, up) for kind in kinds])
+    labels = [axis_label(statistic) for statistic in findings.goals.objectives]
+    ranges = [_range(statistic, kinds, index) for index, statistic in enumerate(findings.goals.objectives)]
+    figure.update_layout(
+        template="plotly_white", height=520, margin={"l": 60, "r": 20, "t": 70, "b": 60}, hovermode="closest",
+        paper_bgcolor="white", legend={"orientation": "h", "y": -0.16}, hoverlabel={"align": "left"},
+        xaxis={"title": {"text": labels[0]}, "range": ranges[0]},
+        yaxis={"title": {"text": labels[up]}, "range": ranges[up]},
+        updatemenus=[_menu("x", labels, kinds, ranges, 0, 0.0), _menu("y", labels, kinds, ranges, up, 0.5)],
+    )  # fmt: skip
+    return figure
 
 
-def explore_parallel(findings: Findings) -> Any:
-    """Parallel coordinates as a plotly figure, in which a range of an axis can be brushed; the first axis is the
-    member's number, at which the recommended one (a star) and the default are named. Without plotly `parallel_figure`.
+def parallel_plot(findings: Findings) -> Any:
+    """Parallel coordinates as a plotly figure, in which ranges of an axis can be brushed; the first axis is the
+    member's number, at which the recommended one (a star) and the default are named.
     """
-    if not available():
-        return parallel_figure(findings)
     import plotly.graph_objects as go
 
     names, table = parallel_table(findings)
@@ -76,81 +87,78 @@ def explore_parallel(findings: Findings) -> Any:
              "ticktext": [named.get(number, str(number)) for number in ticks]},
             *({"label": name, "values": table[:, index]} for index, name in enumerate(names))]  # fmt: skip
     figure = go.Figure(go.Parcoords(line=lines, dimensions=axes, labelangle=-20))
-    figure.update_layout(template="plotly_white", height=460, margin={"l": 60, "r": 20, "t": 110, "b": 30})
+    figure.update_layout(template="plotly_white", height=460, margin={"l": 120, "r": 20, "t": 110, "b": 30})
     return figure
 
 
 CONFIG = {"displaylogo": False, "responsive": True, "modeBarButtonsToRemove": ["lasso2d", "select2d"]}
 
 
-def _figure(findings: Findings, training: Evaluations) -> Any:
-    import plotly.graph_objects as go
+class _Kind(NamedTuple):
+    """Of candidates, N of them."""
 
-    traces = _traces(findings, training)
-    up = min(1, len(findings.goals.objectives) - 1)
-    figure = go.Figure([_scatter(name, points, texts, style, up) for name, points, texts, style in traces])
-    labels = [axis_label(statistic) for statistic in findings.goals.objectives]
-    ranges = [_range(statistic, traces, index) for index, statistic in enumerate(findings.goals.objectives)]
-    figure.update_layout(
-        template="plotly_white", height=520, margin={"l": 60, "r": 20, "t": 70, "b": 60}, hovermode="closest",
-        paper_bgcolor="white", legend={"orientation": "h", "y": -0.16}, hoverlabel={"align": "left"},
-        xaxis={"title": {"text": labels[0]}, "range": ranges[0]},
-        yaxis={"title": {"text": labels[up]}, "range": ranges[up]},
-        updatemenus=[_menu("x", labels, traces, ranges, 0, 0.0), _menu("y", labels, traces, ranges, up, 0.5)],
-    )  # fmt: skip
-    return figure
+    name: str
+    points: np.ndarray  # [N, O]
+    texts: list[str]
+    numbers: list[int]  # as the tables number members; the default 0, others -1
+    style: dict[str, Any]
 
 
-def _traces(findings: Findings, training: Evaluations) -> list[tuple[str, np.ndarray, list[str], dict[str, Any]]]:
-    """Name, points [N, O], texts N and style of each kind of candidate."""
+def _kinds(findings: Findings, training: Evaluations) -> list[_Kind]:
     goals, best, default = findings.goals, recommended(findings), findings.default
     others = [member for member in findings.front if member.row not in (best.row, default.row)]
     rest = np.isin(np.flatnonzero(training.complete), [member.row for member in (*others, best, default)], invert=True)
     texts = [_constants(findings, values) for values in training.values[training.complete][rest]]
-    kinds = [("candidates", candidate_objectives(goals, training)[rest], texts,
-              {"color": GREY, "size": 5, "symbol": "circle"})]  # fmt: skip
+    kinds = [_Kind("candidates", candidate_objectives(goals, training)[rest], texts, [-1] * len(texts),
+                   {"color": GREY, "size": 5, "symbol": "circle"})]  # fmt: skip
     for name, members, style in (
         ("front", others, {"color": BLUE, "size": 10, "symbol": "circle"}),
         ("default constants", [default], {"color": BLACK, "size": 11, "symbol": "square"}),
         (findings.picked, [best], {"color": VERMILLION, "size": 17, "symbol": "star"}),
     ):
-        kinds.append((name, _points(goals, [member.training for member in members]),
-                      [_member_text(findings, member) for member in members], style))  # fmt: skip
+        kinds.append(_of_members(findings, name, members, [member.training for member in members], style))
     unseen = [member for member in (*others, best, default) if member.held_out is not None]
     if unseen:
-        kinds.append(("held out", _points(goals, [member.held_out for member in unseen if member.held_out is not None]),
-                      [_member_text(findings, member) for member in unseen],
-                      {"color": ORANGE, "size": 9, "symbol": "circle-open"}))  # fmt: skip
+        judged = [member.held_out for member in unseen if member.held_out is not None]
+        style = {"color": ORANGE, "size": 9, "symbol": "circle-open"}
+        kinds.append(_of_members(findings, "held out", unseen, judged, style))
     return kinds
 
 
-def _points(goals: Goals, judgements: list[Judgement]) -> np.ndarray:
+def _of_members(findings: Findings, name: str, members: Sequence[Member], judged: Sequence[Judgement],
+                style: dict[str, Any]) -> _Kind:
+    return _Kind(name, _points(findings.goals, judged), [_member_text(findings, member) for member in members],
+                 [_number(findings, member) for member in members], style)  # fmt: skip
+
+
+def _points(goals: Goals, judgements: Sequence[Judgement]) -> np.ndarray:
     """[N, O], also of none."""
     return np.array([[float(in_units(statistic, part.value))
                       for statistic, part in zip(goals.objectives, judged.objectives, strict=True)]
                      for judged in judgements]).reshape(-1, len(goals.objectives))  # fmt: skip
 
 
-def _scatter(name: str, points: np.ndarray, texts: list[str], style: dict[str, Any], up: int) -> Any:
+def _scatter(kind: _Kind, up: int) -> Any:
     import plotly.graph_objects as go
 
-    return go.Scatter(x=_column(points, 0), y=_column(points, up), mode="markers", name=name, text=texts, marker=style,
-                      hovertemplate=f"<b>{name}</b><br>%{{text}}<extra></extra>")  # fmt: skip
+    return go.Scatter(x=_column(kind.points, 0), y=_column(kind.points, up), mode="markers", name=kind.name,
+                      text=kind.texts, customdata=kind.numbers, marker=kind.style,
+                      hovertemplate=f"<b>{kind.name}</b><br>%{{text}}<extra></extra>")  # fmt: skip
 
 
-def _menu(axis: str, labels: list[str], traces: list[Any], ranges: list[list[float]], active: int,
+def _menu(axis: str, labels: list[str], kinds: list[_Kind], ranges: list[list[float]], active: int,
           place: float) -> dict[str, Any]:
     """A list of objectives for one axis."""
     buttons = [{"label": f"{axis}: {label}", "method": "update",
-                "args": [{axis: [_column(points, index) for _, points, _, _ in traces]},
+                "args": [{axis: [_column(kind.points, index) for kind in kinds]},
                          {f"{axis}axis.title.text": label, f"{axis}axis.range": ranges[index]}]}
                for index, label in enumerate(labels)]  # fmt: skip
     return {"buttons": buttons, "active": active, "x": place, "xanchor": "left", "y": 1.14, "yanchor": "top"}
 
 
-def _range(statistic: Statistic, traces: list[Any], index: int) -> list[float]:
+def _range(statistic: Statistic, kinds: list[_Kind], index: int) -> list[float]:
     """Of an axis: that of the members, as candidates far off would press them into a corner."""
-    values = np.concatenate([points[:, index] for _, points, _, _ in traces[1:]])
+    values = np.concatenate([kind.points[:, index] for kind in kinds[1:]])
     return list(view_of(statistic, values, share=0.1))
 
 
@@ -166,13 +174,13 @@ def _member_text(findings: Findings, member: Member) -> str:
         shown = [f"{float(in_units(statistic, judged.objectives[index].value)):.4g}{unit_of(statistic)} {suite}"
                  for suite, judged in parts if judged is not None]  # fmt: skip
         lines.append(f"{escape(measure_name(statistic))}: {', '.join(shown)}")
-    return "<br>".join([_number(findings, member), *lines, _constants(findings, member.values)])
+    return "<br>".join([f"member {_number(findings, member)}", *lines, _constants(findings, member.values)])
 
 
-def _number(findings: Findings, member: Member) -> str:
-    """As the tables number them."""
+def _number(findings: Findings, member: Member) -> int:
+    """As the tables number them; 0: the default."""
     rows = [one.row for one in findings.front]
-    return f"member {rows.index(member.row) + 1}" if member.row in rows else "member 0"
+    return rows.index(member.row) + 1 if member.row in rows else 0
 
 
 def _constants(findings: Findings, values: np.ndarray) -> str:

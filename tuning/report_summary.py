@@ -1,6 +1,6 @@
 """What a tuning job came to, in words and tables for people who did not run it."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -153,10 +153,13 @@ def choices_table(findings: Findings) -> str:
                  ("rule", "member", "success, training", "success, held out", "stable", "reason"), rows)  # fmt: skip
 
 
-def front_table(findings: Findings) -> str:
-    """Every member, its constants and objectives on training, and how surely nothing dominates it."""
+def front_table(findings: Findings, members: Collection[int] | None = None) -> str:
+    """Every member, or those of some numbers, its constants and objectives on training, and how surely nothing
+    dominates it; last the default.
+    """
     objectives = findings.goals.objectives
-    rows = [_front_row(str(index), member, objectives) for index, member in enumerate(findings.front, start=1)]
+    rows = [_front_row(str(index), member, objectives) for index, member in enumerate(findings.front, start=1)
+            if members is None or index in members]  # fmt: skip
     rows.append(_front_row("default", findings.default, objectives))
     return table("Members of the front; surely: share of the resamples in which none dominates it",
                  ("member", *map(name_and_unit, objectives), "surely", *findings.parameters), rows)  # fmt: skip

@@ -1,6 +1,5 @@
 import re
 import shutil
-import sys
 from html.parser import HTMLParser
 
 import numpy as np
@@ -100,26 +99,6 @@ def test_tables_have_captions_and_headers(static):
         assert "<caption>" in table
         assert '<th scope="col">' in table
         assert table.count("<tr>") - 1 == table.count('<th scope="row">')
-
-
-def test_without_plotly_exploring_shows_the_still_pictures(monkeypatch):
-    monkeypatch.setitem(sys.modules, "plotly", None)  # as if it were not installed
-    front = report_interactive.explore_front(findings(), evaluations())
-    assert [text.get_text() for text in front.axes[0].texts] == ["1", "2", "3"]
-    assert report_interactive.explore_parallel(findings()).axes[0].get_xlabel() == ""
-
-
-def test_with_plotly_a_point_names_its_member_and_axes_can_be_brushed():
-    pytest.importorskip("plotly", reason="plotly, the extra `report`, is not installed")
-    front = report_interactive.explore_front(findings(), evaluations())
-    texts = {trace.name: trace.text for trace in front.data}
-    assert [text.split("<br>")[0] for text in (*texts["front"], *texts["recommended"])] == [
-        "member 2", "member 3", "member 1"]  # fmt: skip
-    (lines,) = report_interactive.explore_parallel(findings()).data
-    assert list(lines.dimensions[0]["values"]) == [1, 2, 3, 0]
-    assert list(lines.dimensions[0].ticktext) == ["default", "★ 1 recommended", "2", "3"]
-    assert list(lines.dimensions[1]["values"]) == [*VALUES[[4, 5, 6, 0], 0]]
-    assert lines.dimensions[4].label == "success rate [%]"
 
 
 def test_names_are_escaped(static, interactive):

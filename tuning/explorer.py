@@ -1,0 +1,109 @@
+"""The front in a notebook that answers to the mouse: brush its members, click one to see all of it.
+
+Needs plotly and anywidget, the extra `explore`; without either the same pictures stand still.
+"""
+
+from collections.abc import Callable
+from importlib.util import find_spec
+from typing import Any
+
+import numpy as np
+
+from tuning.evaluations import Evaluations
+from tuning.findings import Findings
+from tuning.report_figures import front_figure, parallel_figure
+from tuning.report_interactive import available, front_plot, parallel_plot
+from tuning.report_summary import front_table
+
+HOW_TO_BRUSH = "Drag along an axis: the members that pass there are listed here."
+LEFT_OUT = "Not a member of the front: click a blue point, or the star."
+LIKE_TABLES = "jp-RenderedHTMLCommon"  # the style of a notebook's tables
+
+
+class MemberPicker:
+    """The front as a notebook shows it. A click on a member makes it `member`, its number in the tables, and shows what
+    `show` has to show of it below the plot. `member` is the recommended one until then; it may be set.
+    """
+
+    def __init__(self, findings: Findings, training: Evaluations, show: Callable[[int], Any] | None = None):
+        self.member = findings.choices[findings.recommended].member + 1
+        self._show, self._count = show, len(findings.front)
+        if not clickable():
+            self._shown: Any = explored_front(findings, training)
+            return
+        import ipywidgets
+        import plotly.graph_objects as go
+
+        plot: Any = go.FigureWidget(front_plot(findings, training))
+        for trace in plot.data:
+            trace.on_click(self._clicked)
+        self._heading = ipywidgets.HTML("Click a member.")
+        self._output = ipywidgets.Output()
+        self._shown = ipywidgets.VBox([plot, self._heading, self._output])
+
+    def choose(self, number: int) -> None:
+        """What a click on the member does."""
+        self._output.clear_output()
+        if not 1 <= number <= self._count:
+            self._heading.value = LEFT_OUT
+            return
+        self.member = number
+        self._heading.value = f"<b>Member {number}</b> …"
+        with self._output:
+            if self._show is not None:
+                self._show(number)
+        self._heading.value = f"<b>Member {number}</b>"
+
+    def _clicked(self, trace: Any, points: Any, state: Any) -> None:
+        for index in points.point_inds[:1]:  # called for every trace, of which one was hit
+            self.choose(int(trace.customdata[index]))
+
+    def _ipython_display_(self) -> None:
+        from IPython.display import display
+
+        display(self._shown)
+
+
+def brush_members(findings: Findings) -> Any:
+    """Parallel coordinates in which ranges of axes can be brushed, and below it the table of the members that pass."""
+    if not clickable():
+        return explored_parallel(findings)
+    import ipywidgets
+    import plotly.graph_objects as go
+
+    plot: Any = go.FigureWidget(parallel_plot(findings))
+    table = ipywidgets.HTML(HOW_TO_BRUSH).add_class(LIKE_TABLES)
+    lines = plot.data[0]
+
+    def brushed(*_: Any) -> None:
+        kept = passing(lines.dimensions)
+        table.value = HOW_TO_BRUSH if len(kept) == len(findings.front) else front_table(findings, kept)
+
+    lines.on_change(brushed, "dimensions")
+    return ipywidgets.VBox([plot, table])
+
+
+def passing(dimensions: Any) -> list[int]:
+    """Numbers of the members, the first axis, that lie within the brushed ranges of every axis."""
+    kept = np.ones(len(dimensions[0]["values"]), np.bool_)
+    for axis in dimensions:
+        if axis.constraintrange:
+            values = np.asarray(axis["values"], np.float64)[:, None]
+            low, high = np.reshape(axis.constraintrange, (-1, 2)).T
+            kept &= ((values >= low) & (values <= high)).any(axis=1)
+    return [int(number) for number in np.asarray(dimensions[0]["values"])[kept] if number > 0]
+
+
+def explored_front(findings: Findings, training: Evaluations) -> Any:
+    """Without a click: a plotly figure whose axes can be chosen, or `front_figure` with the members' numbers."""
+    return front_plot(findings, training) if available() else front_figure(findings, training, numbered=True)
+
+
+def explored_parallel(findings: Findings) -> Any:
+    """Without a table: a plotly figure whose axes can be brushed, or `parallel_figure`."""
+    return parallel_plot(findings) if available() else parallel_figure(findings)
+
+
+def clickable() -> bool:
+    """Whether what is clicked can be answered: plotly and anywidget are installed."""
+    return available() and find_spec("anywidget") is not None
