@@ -11,9 +11,10 @@ from rich import box
 from rich.table import Table
 
 from adwa_jax.episode import Outcome
-from scenarios.drawing import BLACK, BLUE, CELL_LINES, FONT, VERMILLION, new_figure
+from scenarios.drawing import BLACK, BLUE, CELL_LINES, FONT, VERMILLION, figure_of, new_figure
 from scenarios.suite import Suite
 from tuning.ablate import EXTENDED, PAPER, REPEATS, TIMED, Row
+from tuning.figures import Panels, panels_of
 from tuning.outputs import save_figure, write_whole
 
 if TYPE_CHECKING:
@@ -73,22 +74,26 @@ def row_sentence(row: Row) -> str:
     return f"{name}: {success} [{interval}]{against}"
 
 
-def ablation_figure(suite: Suite, rows: Sequence[Row]) -> "Figure":
+def ablation_figure(suite: Suite, rows: Sequence[Row], axes: "Panels | None" = None) -> "Figure":
     """Paired difference in success a rule, with its interval: the rule added to the paper's planner, and taken from the
-    extended. To the right of 0 the change raises success; a mark is filled where the interval leaves out 0.
+    extended. To the right of 0 the change raises success; a mark is filled where the interval leaves out 0. axes: 2.
     """
     rules = list(dict.fromkeys(row.configuration.rule for row in rows if row.configuration.rule))
-    figure = new_figure((8.6, 0.32 * max(len(rules), 2) + 1.9))
-    panels = figure.subplots(1, 2, sharey=True)
+    alone = axes is None
+    size = (8.6, 0.32 * max(len(rules), 2) + 1.9)
+    panels = panels_of(new_figure(size).subplots(1, 2, sharey=True) if axes is None else axes, 2)
     for ax, base, verb, style in zip(panels, (PAPER, EXTENDED), ("added to", "taken from"),
                                      ({"marker": "s", "color": BLUE}, {"marker": "o", "color": VERMILLION}),
                                      strict=True):  # fmt: skip
         chosen = [row for row in rows if row.configuration.rule and row.configuration.base == base]
         _draw_forest(chosen, rules, style, ax)
         ax.set_title(f"rule {verb} the {base} planner{_rate(rows, base)}".replace("paper ", "paper's "), fontsize=FONT)
-    panels[0].set_yticks(range(len(rules)), rules)
-    panels[0].set_ylim(len(rules) - 0.4, -0.6)
-    figure.suptitle(f"{suite.name}, {len(suite.scenarios)} scenarios", fontsize=FONT + 1)
+    for ax in panels[:1] if alone else panels:
+        ax.set_yticks(range(len(rules)), rules)
+        ax.set_ylim(len(rules) - 0.4, -0.6)
+    figure = figure_of(panels[0])
+    if alone:
+        figure.suptitle(f"{suite.name}, {len(suite.scenarios)} scenarios", fontsize=FONT + 1)
     return figure
 
 

@@ -6,10 +6,18 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from adwa_jax.presets import Preset
-from scenarios.drawing import FONT, figure_legend, legend_below, new_figure
+from scenarios.drawing import FONT, figure_of, legend_below, new_figure
 from scenarios.suite import Suite
 from tuning.evaluations import Evaluations
-from tuning.figures import drive_figure, drive_points, drive_sentence, used_map_size
+from tuning.figures import (
+    Panels,
+    drive_figure,
+    drive_points,
+    drive_sentence,
+    legend_of,
+    panels_of,
+    used_map_size,
+)
 from tuning.gallery import SECONDS, Cause, cause_by_result, turned_back
 from tuning.last_seconds import draw_last_seconds
 from tuning.outputs import save_figure
@@ -38,25 +46,29 @@ def failure_pictures(suite: Suite, preset: Preset, results: Results, folder: Pat
     return tuple(_pictured(suite, preset, results, index, folder, y_down) for index in worst(results)[:limit])
 
 
-def worst_figure(suite: Suite, preset: Preset, results: Results, limit: int = 3, y_down: bool = False) -> "Figure":
+def worst_figure(suite: Suite, preset: Preset, results: Results, limit: int = 3, y_down: bool = False,
+                 axes: "Panels | None" = None) -> "Figure":
     """Drive the worst scenarios again, as `failure_pictures`, and draw them side by side: of a failure the last
-    seconds, of a success the whole way.
+    seconds, of a success the whole way. axes: one a scenario, `limit` or as many as there are.
     """
+    alone = axes is None
     shown = worst(results)[:limit]
     driven = [replay(suite.scenarios[index], preset) for index in shown]
-    height = max(used_map_size(one.scenario.grid, drive_points(one.scenario, one.plan, one.trace), 4.4, 0.6)[1]
-                 for one in driven)  # fmt: skip
-    figure = new_figure((4.4 * len(shown), height))
-    axes = figure.subplots(1, len(shown), squeeze=False)[0].tolist()
+    if axes is None:
+        height = max(used_map_size(one.scenario.grid, drive_points(one.scenario, one.plan, one.trace), 4.4, 0.6)[1]
+                     for one in driven)  # fmt: skip
+        axes = new_figure((4.4 * len(shown), height)).subplots(1, len(shown), squeeze=False)
+    panels = panels_of(axes, len(shown))
     shaded = None
-    for ax, one, index in zip(axes, driven, shown, strict=True):
+    for ax, one, index in zip(panels, driven, shown, strict=True):
         if results.reached[index]:
             _whole_drive(one, suite.names[index], y_down, ax)
         else:
             shaded = _last_seconds(one, suite.names[index], y_down, ax) or shaded
-    figure_legend(figure, axes)
+    legend_of(panels, alone)
+    figure = figure_of(panels[0])
     if shaded is not None:
-        _time_bar(shaded, axes, figure)
+        _time_bar(shaded, panels, figure)
     return figure
 
 

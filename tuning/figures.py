@@ -6,7 +6,7 @@ Dimension letters: P path cells; Q key points; T control steps; M movers; D disc
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias
 
 import jax
 import jax.numpy as jnp
@@ -45,6 +45,7 @@ from scenarios.drawing import (
     mover_ways,
     new_figure,
 )
+from scenarios.errors import InputError
 from scenarios.padding import ladder_size
 from tuning.intervals import wilson
 from tuning.planning import PlannedPath
@@ -56,6 +57,7 @@ if TYPE_CHECKING:
     from tuning.replay import Replay
     from tuning.results import Results
 
+Panels: TypeAlias = "Axes | Sequence[Axes] | np.ndarray"
 Route = Literal["path", "key points"]
 PAPER_SUCCESS = 0.956  # §3.4
 SENTENCES = {
@@ -110,28 +112,27 @@ def plan_figure(grid: Grid, plan: Plan | PlannedPath, planner: str = "A*", y_dow
     return figure_of(ax)
 
 
-def compare_plans(comparisons: Sequence[Comparison], axes: Any = None, y_down: bool = False) -> "Figure":
+def compare_plans(comparisons: Sequence[Comparison], axes: "Panels | None" = None, y_down: bool = False) -> "Figure":
     """Fig. 3: the traditional A*'s grid path and the improved A*'s key points, each with its danger points ringed.
 
     One map: side by side; several: a column each, the traditional above the improved. axes: an array of such a shape.
     """
     several = len(comparisons) > 1
     shape = (2, len(comparisons)) if several else (1, 2)
-    figure = None
+    alone = axes is None
     if axes is None:
         height = max(used_map_size(grid, _points(planned_path(grid, plan)), 3.6, 0.15)[1]
                      for _, grid, *plans in comparisons for plan in plans)  # fmt: skip
-        figure = new_figure((3.6 * shape[1], height * shape[0] + 0.4))
-        axes = figure.subplots(*shape, squeeze=False)
-    axes = np.asarray(axes).reshape(shape)
-    pairs = axes.T if several else axes
+        axes = new_figure((3.6 * shape[1], height * shape[0] + 0.4)).subplots(*shape, squeeze=False)
+    panels = panels_of(axes, 2 * len(comparisons))
+    placed = np.reshape(np.array(panels, object), shape)
+    pairs = placed.T if several else placed
     for comparison, (above, below) in zip(comparisons, pairs, strict=True):
         name = f"{comparison.name}, " if comparison.name else ""
         _draw_panel(comparison.grid, comparison.traditional, "path", f"{name}traditional A*", above, y_down)
         _draw_panel(comparison.grid, comparison.improved, "key points", f"{name}improved A*", below, y_down)
-    if figure is not None:
-        figure_legend(figure, axes.ravel().tolist())
-    return figure_of(axes.flat[0])
+    legend_of(panels, alone)
+    return figure_of(panels[0])
 
 
 def drive_figure(scenario: Scenario, plan: Plan, episode: Episode, trace: Trace, title: str = "",
@@ -170,17 +171,19 @@ def drive_figure(scenario: Scenario, plan: Plan, episode: Episode, trace: Trace,
     return figure_of(ax)
 
 
-def compare_drives(drives: Mapping[str, "Replay"], y_down: bool = False) -> "Figure":
-    """Fig. 4: drives side by side, each as `drive_figure` has it under its name, with one legend."""
-    height = max(used_map_size(driven.scenario.grid, drive_points(driven.scenario, driven.plan, driven.trace), 4.6,
-                               0.6)[1] for driven in drives.values())  # fmt: skip
-    figure = new_figure((4.6 * len(drives), height))
-    axes = figure.subplots(1, len(drives), squeeze=False)[0]
-    for (name, driven), ax in zip(drives.items(), axes, strict=True):
+def compare_drives(drives: Mapping[str, "Replay"], y_down: bool = False, axes: "Panels | None" = None) -> "Figure":
+    """Fig. 4: drives side by side, each as `drive_figure` has it under its name, with one legend. axes: one a drive."""
+    alone = axes is None
+    if axes is None:
+        height = max(used_map_size(driven.scenario.grid, drive_points(driven.scenario, driven.plan, driven.trace), 4.6,
+                                   0.6)[1] for driven in drives.values())  # fmt: skip
+        axes = new_figure((4.6 * len(drives), height)).subplots(1, len(drives), squeeze=False)
+    panels = panels_of(axes, len(drives))
+    for (name, driven), ax in zip(drives.items(), panels, strict=True):
         drive_figure(driven.scenario, driven.plan, driven.episode, driven.trace, title=name, ax=ax, y_down=y_down,
                      legend=False)
-    figure_legend(figure, axes.tolist())
-    return figure
+    legend_of(panels, alone)
+    return figure_of(panels[0])
 
 
 def outcome_figure(results: Mapping[str, "Results"], ax: "Axes | None" = None) -> "Figure":
@@ -199,7 +202,7 @@ def outcome_figure(results: Mapping[str, "Results"], ax: "Axes | None" = None) -
     ax.set(xlim=(0, 100))
     ax.set_xlabel("scenarios [%]", fontsize=FONT)
     ax.tick_params(labelsize=FONT - 1)
-    legend_of(ax, alone)
+    legend_of([ax], alone)
     return figure_of(ax)
 
 
@@ -227,7 +230,7 @@ def success_figure(rates: Mapping[str, tuple[int, int]], paper: float | None = P
     ax.set_ylabel("success rate [%], 95 % interval", fontsize=FONT)
     ax.tick_params(labelsize=FONT - 1)
     if paper is not None:
-        legend_of(ax, alone)
+        legend_of([ax], alone)
     return figure_of(ax)
 
 
@@ -413,29 +416,42 @@ def draw_outline(discs: np.ndarray, radius: float, ax: "Axes", label: str = "rob
             for index, (x, y) in enumerate(discs)]  # fmt: skip
 
 
-def legend_of(ax: "Axes", alone: bool) -> None:
-    """One under the figure where the axes stand `alone` in it, else under their own x axis, below its labels."""
-    from matplotlib.transforms import ScaledTranslation
+def panels_of(axes: "Panels", count: int) -> list["Axes"]:
+    """The axes of a figure of several panels, given as a list or an array. InputError where they are not as many."""
+    panels = np.ravel(np.array(axes, object)).tolist()
+    if len(panels) != count:
+        raise InputError(f"axes: {len(panels)}; this figure has {count} panels; give as many, or none")
+    return panels
 
-    figure = figure_of(ax)
+
+def legend_of(axes: Sequence["Axes"], alone: bool) -> None:
+    """One under the figure where the axes stand `alone` in it, else each one's under its own x axis."""
     if alone:
-        figure_legend(figure, [ax])
+        figure_legend(figure_of(axes[0]), axes)
         return
-    names = [name for name in ax.get_legend_handles_labels()[1] if name]
-    widest = max((len(name) for name in names), default=0)
-    inches = figure.get_figwidth() * ax.get_position().width
-    legend_below(ax, columns=max(1, min(len(names), int(inches / (0.065 * widest + 0.5)))))
-    labels = ax.xaxis.get_tightbbox()
-    down = (ax.bbox.y0 - labels.y0) / figure.dpi if labels else 0.0
-    below = ax.transAxes + ScaledTranslation(0.0, -down - 0.06, figure.dpi_scale_trans)
-    legend = ax.get_legend()
-    if legend:
-        legend.set_bbox_to_anchor((0.5, 0.0), below)
+    for ax in axes:
+        _own_legend(ax)
 
 
 def prefixed(title: str) -> str:
     """The title, if there is one, before what follows it."""
     return f"{title}: " if title else ""
+
+
+def _own_legend(ax: "Axes") -> None:
+    """Below the labels of the x axis, in as many columns as fit; none where nothing has a name."""
+    from matplotlib.transforms import ScaledTranslation
+
+    names = [name for name in ax.get_legend_handles_labels()[1] if name]
+    if not names:
+        return
+    figure = figure_of(ax)
+    inches = figure.get_figwidth() * ax.get_position().width
+    legend_below(ax, columns=max(1, min(len(names), int(inches / (0.065 * max(map(len, names)) + 0.5)))))
+    labels = ax.xaxis.get_tightbbox()
+    down = (ax.bbox.y0 - labels.y0) / figure.dpi if labels else 0.0
+    below = ax.transAxes + ScaledTranslation(0.0, -down - 0.06, figure.dpi_scale_trans)
+    ax.get_legend().set_bbox_to_anchor((0.5, 0.0), below)  # pyright: ignore[reportOptionalMemberAccess]
 
 
 def _rated(name: str, results: "Results") -> str:

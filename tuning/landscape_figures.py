@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from scenarios.drawing import BLACK, BLUE, CELL_LINES, FONT, ORANGE, VERMILLION, figure_legend, figure_of, new_figure
+from scenarios.drawing import BLACK, BLUE, CELL_LINES, FONT, ORANGE, VERMILLION, figure_of, new_figure
+from tuning.figures import Panels, legend_of, panels_of
 from tuning.findings import Interval
 from tuning.search_slope import Smoothed
 from tuning.softened import Softened
@@ -35,28 +36,28 @@ class Arrows(NamedTuple):
 
 
 def landscape_figure(space: Space, unit: np.ndarray, hard: np.ndarray, relaxed: np.ndarray,
-                     arrows: Arrows | None = None, axes: "Sequence[Axes] | None" = None) -> "Figure":
+                     arrows: Arrows | None = None, axes: "Panels | None" = None) -> "Figure":
     """The hard loss and the relaxed one side by side, both [A · U] at the points `unit` [A · U, 2] of a lattice, and at
     some points which way down each planner's gradient says; arrows have one length.
     """
-    if axes is None:
-        axes = list(new_figure((10.4, 4.9)).subplots(1, 2))
-    for ax, losses, label in zip(axes, (hard, relaxed), ("scalarised objective of the hard planner [1]",
+    alone = axes is None
+    panels = panels_of(new_figure((10.4, 4.9)).subplots(1, 2) if axes is None else axes, 2)
+    for ax, losses, label in zip(panels, (hard, relaxed), ("scalarised objective of the hard planner [1]",
                                                          "loss of the relaxed planner [1]"), strict=True):  # fmt: skip
         _draw_losses(space, unit, losses, ax, label)
         if arrows is not None:
             _draw_arrows(space, arrows.points, arrows.hard, ax, "downhill by the hard gradient", HARD)
             _draw_arrows(space, arrows.points, arrows.relaxed, ax, "downhill by the surrogate's gradient", SOFT)
             _number(space.values(arrows.points), ax)
-    figure_legend(figure_of(axes[0]), list(axes))
-    return figure_of(axes[0])
+    legend_of(panels, alone)
+    return figure_of(panels[0])
 
 
 def intervals_figure(found: Mapping[str, Interval], label: str, chance: float = 0.0, least: float = -1.0,
                      ax: "Axes | None" = None) -> "Figure":
     """Estimates by name with their 95 % intervals, on an axis from `least` to 1; dashed: what chance would give."""
-    if ax is None:
-        ax = new_figure((7.4, 0.42 * len(found) + 1.2)).subplots()
+    alone = ax is None
+    ax = new_figure((7.4, 0.42 * len(found) + 1.2)).subplots() if ax is None else ax
     place = np.arange(len(found))
     value, low, high = np.array(list(found.values())).T
     ax.errorbar(value, place, xerr=np.maximum([value - low, high - value], 0.0), fmt="o", color=BLUE, capsize=3,
@@ -65,15 +66,15 @@ def intervals_figure(found: Mapping[str, Interval], label: str, chance: float = 
     ax.set_yticks(place, list(found), fontsize=FONT)
     ax.set(ylim=(len(found) - 0.5, -0.5), xlim=(least - 0.05, 1.05))
     _dress(ax, label, "")
-    figure_legend(figure_of(ax), [ax])
+    legend_of([ax], alone)
     return figure_of(ax)
 
 
 def temperature_figure(temperatures: Sequence[float], cosines: Sequence[Interval], signs: Sequence[Interval],
                        ax: "Axes | None" = None) -> "Figure":
     """Agreement of the surrogate's gradient with the hard one over the temperature of the choice, [L] each."""
-    if ax is None:
-        ax = new_figure((6.4, 3.6)).subplots()
+    alone = ax is None
+    ax = new_figure((6.4, 3.6)).subplots() if ax is None else ax
     styles: tuple[dict[str, Any], ...] = ({"fmt": "o-", "color": BLUE},
                                           {"fmt": "D--", "color": ORANGE, "markeredgecolor": BLACK})  # fmt: skip
     for shift, found, name, style in ((0.96, cosines, "mean cosine", styles[0]),
@@ -85,34 +86,34 @@ def temperature_figure(temperatures: Sequence[float], cosines: Sequence[Interval
         ax.axhline(chance, color=BLACK, linewidth=0.8, linestyle=":", label="chance: 0 and ½", zorder=0)
     ax.set(xscale="log", ylim=(-1.05, 1.05))
     _dress(ax, "temperature of the choice [1]", "agreement with the hard gradient [1]")
-    figure_legend(figure_of(ax), [ax])
+    legend_of([ax], alone)
     return figure_of(ax)
 
 
-def softened_figure(found: Softened, axes: "Sequence[Axes] | None" = None) -> "Figure":
+def softened_figure(found: Softened, axes: "Panels | None" = None) -> "Figure":
     """One decision: each candidate's share at every temperature, then the turn commanded over one weight.
 
     axes: L + 1.
     """
-    count = len(found.temperatures)
+    count, alone = len(found.temperatures), axes is None
     if axes is None:
         figure = new_figure((3.1 * count + 0.3, 6.6))
         grid = figure.add_gridspec(2, count, height_ratios=(1.0, 1.15))
         axes = [*(figure.add_subplot(grid[0, place]) for place in range(count)), figure.add_subplot(grid[1, :])]
-    for place, ax in enumerate(axes[:count]):
+    panels = panels_of(axes, count + 1)
+    for place, ax in enumerate(panels[:count]):
         _draw_share(found, place, ax)
-    _draw_command(found, axes[count])
-    figure_legend(figure_of(axes[0]), list(axes))
-    return figure_of(axes[0])
+    _draw_command(found, panels[count])
+    legend_of(panels, alone)
+    return figure_of(panels[0])
 
 
 def smoothed_figure(found: Smoothed, name: str = "expansions", unit: str = "1",
-                    axes: "Sequence[Axes] | None" = None) -> "Figure":
+                    axes: "Panels | None" = None) -> "Figure":
     """A search's f(ω) on the first map, its mean over a window with tangents, and the slope over all maps."""
-    if axes is None:
-        axes = list(new_figure((10.4, 4.2)).subplots(1, 2))
+    alone = axes is None
+    left, right = panels_of(new_figure((10.4, 4.2)).subplots(1, 2) if axes is None else axes, 2)
     weight = found.weight[found.inner]
-    left, right = axes
     left.step(found.weight, found.each[0], where="mid", color=BLACK, linewidth=1.0, label=f"{name} on one map")
     left.plot(weight, found.mean[0], color=BLUE, linewidth=2.0, label=f"mean over ω ± {found.reach:g}")
     for place in np.linspace(0, len(weight) - 1, 7).round().astype(int)[1:-1]:
@@ -128,7 +129,7 @@ def smoothed_figure(found: Smoothed, name: str = "expansions", unit: str = "1",
     right.plot(weight, found.slope[0], color=BLACK, linewidth=0.9, linestyle=":", label="slope on the one map")
     right.axhline(0.0, color=BLACK, linewidth=0.8, linestyle="--")
     _dress(right, "heuristic weight ω [1]", f"slope of {name} over ω [{unit}]")
-    figure_legend(figure_of(left), list(axes))
+    legend_of([left, right], alone)
     return figure_of(left)
 
 

@@ -1,7 +1,8 @@
 """The pictures of a tuning job: front, parallel coordinates, sweeps, hypervolume, importance, stability of the choices,
 optimism gap, gradient agreement.
 
-Findings in, matplotlib figures out. Conventions: `scenarios.drawing`. Where a figure has one panel, `ax` may be given.
+Findings in, matplotlib figures out. Conventions: `scenarios.drawing`. `ax`, or
+`axes` where a figure has several panels, may be given: each then has a legend of its own.
 Dimension letters: D parameters; O objectives; N members; W candidates; G generations; S starts of the gradient method.
 """
 
@@ -20,14 +21,13 @@ from scenarios.drawing import (
     ORANGE,
     SKY,
     VERMILLION,
-    figure_legend,
     figure_of,
     new_figure,
 )
 from tuning.analysis import judgements
 from tuning.console import UNITS
 from tuning.evaluations import Evaluations
-from tuning.figures import legend_of
+from tuning.figures import Panels, legend_of, panels_of
 from tuning.findings import BY_HAND, Findings, HypervolumeCurve, Judgement, Member
 from tuning.objectives import RATES, Goals, Statistic, estimate
 from tuning.weights_file import UNITS as CONSTANT_UNITS
@@ -96,17 +96,18 @@ def view_of(statistic: Statistic, values: np.ndarray, share: float = 0.12) -> tu
     return max(ends[0], -marker), min(ends[1], 100.0 + marker)
 
 
-def front_figure(findings: Findings, training: Evaluations | None = None, numbered: bool = False) -> "Figure":
+def front_figure(findings: Findings, training: Evaluations | None = None, numbered: bool = False,
+                 axes: "Panels | None" = None) -> "Figure":
     """Every pair of objectives: the front, the default constants and the recommended ones, a line from each to its
     value on the held-out suite; all candidates in grey if `training` is given. One objective: by candidate.
 
-    numbered: members of the front carry the numbers that tables give them, from 1.
+    numbered: members of the front carry the numbers that tables give them, from 1. axes: one a pair, or one.
     """
     objectives = findings.goals.objectives
     if len(objectives) == 1:
-        return _single_objective(findings, training)
+        return _single_objective(findings, training, axes)
     pairs = list(combinations(range(len(objectives)), 2))
-    figure, panels = _panels(len(pairs), height=3.0)
+    panels = _panels(len(pairs), height=3.0) if axes is None else panels_of(axes, len(pairs))
     cloud = candidate_objectives(findings.goals, training) if training is not None else None
     for ax, (across, up) in zip(panels, pairs, strict=True):
         _show_members(findings, across, up, ax)
@@ -117,8 +118,8 @@ def front_figure(findings: Findings, training: Evaluations | None = None, number
             _number_members(findings, across, up, ax)
         _label_axes(ax, axis_label(objectives[across]), axis_label(objectives[up]))
         _mark_rates(ax, objectives[across], objectives[up])
-    figure_legend(figure, panels)
-    return figure
+    legend_of(panels, axes is None)
+    return figure_of(panels[0])
 
 
 def parallel_table(findings: Findings) -> tuple[list[str], np.ndarray]:
@@ -173,7 +174,7 @@ def parallel_figure(findings: Findings, ax: "Axes | None" = None) -> "Figure":
     bar = figure_of(ax).colorbar(shades, ax=ax, pad=0.01, shrink=0.8)
     bar.set_label(axis_label(findings.goals.objectives[shade]), fontsize=FONT)
     bar.ax.tick_params(labelsize=FONT - 1)
-    legend_of(ax, alone)
+    legend_of([ax], alone)
     return figure_of(ax)
 
 
@@ -202,23 +203,29 @@ def sweeps(training: Evaluations, fewest: int = 3) -> list[Sweep]:
     return found
 
 
-def sweep_figure(goals: Goals, training: Evaluations, found: Sequence[Sweep]) -> "Figure":
-    """§3.4: each parameter in turn (down) against each objective (across), with 95 % intervals; default dashed."""
+def sweep_figure(goals: Goals, training: Evaluations, found: Sequence[Sweep],
+                 axes: "Panels | None" = None) -> "Figure":
+    """§3.4: each parameter in turn (down) against each objective (across), with 95 % intervals; default dashed.
+
+    axes: row by row.
+    """
     columns, rows = len(goals.objectives), len(found)
-    figure = new_figure((2.5 * columns + 0.4, 2.0 * rows + 0.5))
-    grid = figure.subplots(rows, columns, squeeze=False)
-    for line, sweep in zip(grid, found, strict=True):
-        place = training.values[sweep.rows, sweep.parameter]
+    if axes is None:
+        axes = new_figure((2.5 * columns + 0.4, 2.0 * rows + 0.5)).subplots(rows, columns, squeeze=False)
+    panels = panels_of(axes, rows * columns)
+    for place, sweep in enumerate(found):
+        line = panels[place * columns : (place + 1) * columns]
+        values = training.values[sweep.rows, sweep.parameter]
         judged = [one.objectives for one in judgements(training, sweep.rows.tolist(), goals, SEED)]
         for ax, statistic, intervals in zip(line, goals.objectives, zip(*judged, strict=True), strict=True):
             points = in_units(statistic, intervals)
-            ax.fill_between(place, points[:, 1], points[:, 2], color=SKY, alpha=0.4, linewidth=0)
-            ax.plot(place, points[:, 0], color=BLUE, marker="o", markersize=3, linewidth=1.4)
+            ax.fill_between(values, points[:, 1], points[:, 2], color=SKY, alpha=0.4, linewidth=0)
+            ax.plot(values, points[:, 0], color=BLUE, marker="o", markersize=3, linewidth=1.4)
             ax.axvline(training.values[0, sweep.parameter], color=BLACK, linestyle="--", linewidth=0.9)
             name = training.parameters[sweep.parameter].replace("_", " ")
             _label_axes(ax, name, name_and_unit(statistic))
             _mark_rates(ax, None, statistic)
-    return figure
+    return figure_of(panels[0])
 
 
 def hypervolume_figure(curve: HypervolumeCurve, ax: "Axes | None" = None) -> "Figure":
@@ -283,10 +290,10 @@ def stability_figure(findings: Findings, ax: "Axes | None" = None) -> "Figure":
     return figure_of(ax)
 
 
-def optimism_figure(findings: Findings) -> "Figure":
+def optimism_figure(findings: Findings, axes: "Panels | None" = None) -> "Figure":
     """Training against held-out, a panel an objective, with 95 % intervals: on the dashed line both are equal."""
     objectives = findings.goals.objectives
-    figure, panels = _panels(len(objectives), height=3.1, columns=min(len(objectives), 2))
+    panels = _panels(len(objectives), 3.1, columns=2) if axes is None else panels_of(axes, len(objectives))
     best = recommended(findings)
     for index, (ax, statistic) in enumerate(zip(panels, objectives, strict=True)):
         others = [member for member in findings.front if member is not best]
@@ -298,8 +305,8 @@ def optimism_figure(findings: Findings) -> "Figure":
         _label_axes(ax, f"training: {name_and_unit(statistic)}", f"held-out: {name_and_unit(statistic)}")
         _mark_rates(ax, statistic, statistic)
         ax.set_title(axis_label(statistic).rpartition(", ")[2], fontsize="medium")
-    figure_legend(figure, panels)
-    return figure
+    legend_of(panels, axes is None)
+    return figure_of(panels[0])
 
 
 def agreement_figure(agreement: Mapping[str, np.ndarray], place_name: str = "start",
@@ -322,7 +329,7 @@ def agreement_figure(agreement: Mapping[str, np.ndarray], place_name: str = "sta
     ax.set(ylim=(-1.05, 1.05), xlim=(-0.5, len(cosine) - 0.5))
     _label_axes(ax, place_name, "agreement [1]")
     ax.set_xticks(place, [str(index + 1) for index in place])
-    legend_of(ax, alone)
+    legend_of([ax], alone)
     return figure_of(ax)
 
 
@@ -333,15 +340,15 @@ def candidate_objectives(goals: Goals, evaluations: Evaluations) -> np.ndarray:
                      for statistic in goals.objectives], axis=1)  # fmt: skip
 
 
-def _panels(count: int, height: float, columns: int = COLUMNS) -> tuple["Figure", list[Any]]:
-    """`count` axes; what is left of the last row is empty."""
+def _panels(count: int, height: float, columns: int = COLUMNS) -> list["Axes"]:
+    """`count` axes of a new figure; what is left of the last row is empty."""
     columns = min(count, columns)
     rows = ceil(count / columns)
     figure = new_figure((3.2 * columns + 0.3, height * rows + 0.5))
     panels = figure.subplots(rows, columns, squeeze=False).ravel().tolist()
     for spare in panels[count:]:
         spare.set_axis_off()
-    return figure, panels[:count]
+    return panels[:count]
 
 
 def _draw_members(findings: Findings, across: int, up: int, ax: "Axes") -> None:
@@ -445,9 +452,9 @@ def _mark_rates(ax: "Axes", across: Statistic | None, up: Statistic | None) -> N
             axis.set_ticks(ticks[(ticks >= max(low, -1e-9)) & (ticks <= min(high, 100.0 + 1e-9))].tolist())
 
 
-def _single_objective(findings: Findings, training: Evaluations | None) -> "Figure":
+def _single_objective(findings: Findings, training: Evaluations | None, axes: "Panels | None") -> "Figure":
     """The only objective of every candidate in the order in which they were asked for."""
-    ax = new_figure((5.6, 3.4)).subplots()
+    (ax,) = panels_of(new_figure((5.6, 3.4)).subplots() if axes is None else axes, 1)
     (statistic,) = findings.goals.objectives
     if training is not None:
         cloud = candidate_objectives(findings.goals, training)
@@ -463,7 +470,7 @@ def _single_objective(findings: Findings, training: Evaluations | None) -> "Figu
             _draw_held_out(*ends, style["color"], kind, ax)
     _label_axes(ax, "candidate, in the order asked for", axis_label(statistic))
     _mark_rates(ax, None, statistic)
-    figure_legend(figure_of(ax), [ax])
+    legend_of([ax], axes is None)
     return figure_of(ax)
 
 

@@ -1,12 +1,12 @@
 """Pictures of what both planners and the heuristic weight do over many maps. Conventions: `scenarios.drawing`."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from scenarios.drawing import BLACK, BLUE, FONT, ORANGE, SKY, VERMILLION, figure_legend, figure_of, new_figure
-from tuning.figures import legend_of
+from scenarios.drawing import BLACK, BLUE, FONT, ORANGE, SKY, VERMILLION, figure_of, new_figure
+from tuning.figures import Panels, legend_of, panels_of
 from tuning.intervals import mean_interval
 from tuning.search_study import Tradeoff
 from tuning.table1 import PAPER_TABLE, QUANTITIES, PlannedMaps, measured, verdicts
@@ -19,14 +19,15 @@ MARKS = ("o", "s", "^", "D", "v", "P")
 VERDICTS = (("improved A* better", BLUE, ""), ("equal", "#E6E6E6", "...."), ("traditional A* better", ORANGE, "////"))
 
 
-def table1_figure(reports: Mapping[int, PlannedMaps], axes: "Sequence[Axes] | None" = None) -> "Figure":
+def table1_figure(reports: Mapping[int, PlannedMaps], axes: "Panels | None" = None) -> "Figure":
     """Table 1: each quantity's mean over the maps with its 95 % interval, filled; the paper's one map, hollow.
 
     reports: by the side of the maps in cells.
     """
-    if axes is None:
-        axes = list(new_figure((10.2, 3.7)).subplots(1, len(QUANTITIES)))
-    for place, (quantity, ax) in enumerate(zip(QUANTITIES, axes, strict=True)):
+    alone = axes is None
+    count = len(QUANTITIES)
+    panels = panels_of(new_figure((10.2, 3.7)).subplots(1, count) if axes is None else axes, count)
+    for place, (quantity, ax) in enumerate(zip(QUANTITIES, panels, strict=True)):
         for side, (planner, marker, colour) in enumerate((("improved", "o", BLUE), ("traditional", "s", VERMILLION))):
             at = np.arange(len(reports)) + 0.18 * (side - 0.5)
             mean, low, high = np.array([mean_interval(measured(maps)[quantity][side]) for maps in reports.values()]).T
@@ -41,8 +42,8 @@ def table1_figure(reports: Mapping[int, PlannedMaps], axes: "Sequence[Axes] | No
         ax.set(xlim=(-0.6, len(reports) - 0.4), ylim=(-0.04 * top, 1.06 * top))
         ax.set_ylabel(quantity if "[" in quantity else f"{quantity} [1]", fontsize=FONT)
         ax.tick_params(labelsize=FONT - 1)
-    figure_legend(figure_of(axes[0]), list(axes))
-    return figure_of(axes[0])
+    legend_of(panels, alone)
+    return figure_of(panels[0])
 
 
 def verdict_figure(reports: Mapping[str, PlannedMaps], ax: "Axes | None" = None) -> "Figure":
@@ -63,31 +64,31 @@ def verdict_figure(reports: Mapping[str, PlannedMaps], ax: "Axes | None" = None)
     ax.set(xlim=(0, 100))
     ax.set_xlabel("maps [%]", fontsize=FONT)
     ax.tick_params(labelsize=FONT - 1)
-    legend_of(ax, alone)
+    legend_of([ax], alone)
     return figure_of(ax)
 
 
 def weight_study_figure(constant: Mapping[float, Tradeoff], shapes: Mapping[str, Tradeoff],
-                        axes: "Sequence[Axes] | None" = None) -> "Figure":
+                        axes: "Panels | None" = None) -> "Figure":
     """Expansions and path length beside ω = 1, over constant ω and against each other, where shapes of eq. 5 stand too.
 
     The lower left is best: less to search, and no longer a path.
     """
-    if axes is None:
-        axes = list(new_figure((11.0, 4.4)).subplots(1, 3))
+    alone = axes is None
+    panels = panels_of(new_figure((11.0, 4.4)).subplots(1, 3) if axes is None else axes, 3)
     weights = np.array(list(constant))
-    for ax, name, label in zip(axes[:2], ("expansions", "length"), ("expansions", "path length"), strict=True):
+    for ax, name, label in zip(panels[:2], ("expansions", "length"), ("expansions", "path length"), strict=True):
         mean, low, high = np.array([getattr(found, name) for found in constant.values()]).T
         ax.fill_between(weights, low, high, color=SKY, alpha=0.5, linewidth=0, label="95 % of the mean")
         ax.plot(weights, mean, color=BLUE, marker="o", markersize=4, label="constant ω")
         ax.axhline(1.0, color=BLACK, linewidth=0.8, linestyle="--")
         ax.set_xlabel("heuristic weight ω [1]", fontsize=FONT)
         ax.set_ylabel(f"{label} ÷ those of ω = 1 [1]".replace("length ÷ those", "length ÷ that"), fontsize=FONT)
-    draw_tradeoff(constant, shapes, axes[2])
-    for ax in axes:
+    draw_tradeoff(constant, shapes, panels[2])
+    for ax in panels:
         ax.tick_params(labelsize=FONT - 1)
-    figure_legend(figure_of(axes[0]), list(axes))
-    return figure_of(axes[0])
+    legend_of(panels, alone)
+    return figure_of(panels[0])
 
 
 def draw_tradeoff(constant: Mapping[float, Tradeoff], shapes: Mapping[str, Tradeoff],

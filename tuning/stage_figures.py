@@ -30,7 +30,7 @@ from scenarios.drawing import (
     legend_below,
     new_figure,
 )
-from tuning.figures import disc_centres, draw_outline, draw_used_map, used_map_size
+from tuning.figures import Panels, disc_centres, draw_outline, draw_used_map, panels_of, used_map_size
 from tuning.planning import path_length
 from tuning.stages import Densities, Moment
 
@@ -96,14 +96,18 @@ def expansion_figure(grid: Grid, found: SearchResult, name: str = "A*", y_down: 
     return figure_of(ax)
 
 
-def decision_figure(scenario: Scenario, moment: Moment, robot: RobotLimits, y_down: bool = False) -> "Figure":
-    """One decision: all candidates on the map, the window of velocities, and the terms of the chosen one."""
-    figure = new_figure((10.4, 5.9))
-    grid = figure.add_gridspec(2, 2, width_ratios=(1.25, 1.0))
-    draw_candidates(scenario, moment, robot, figure.add_subplot(grid[:, 0]), y_down)
-    draw_window(moment, figure.add_subplot(grid[0, 1]))
-    draw_terms(moment, figure.add_subplot(grid[1, 1]))
-    return figure
+def decision_figure(scenario: Scenario, moment: Moment, robot: RobotLimits, y_down: bool = False,
+                    axes: "Panels | None" = None) -> "Figure":
+    """One decision: all candidates on the map, the window of velocities, and the terms of the chosen one. axes: 3."""
+    if axes is None:
+        figure = new_figure((10.4, 5.9))
+        grid = figure.add_gridspec(2, 2, width_ratios=(1.25, 1.0))
+        axes = [figure.add_subplot(grid[place]) for place in (np.s_[:, 0], np.s_[0, 1], np.s_[1, 1])]
+    arcs, window, terms = panels_of(axes, 3)
+    draw_candidates(scenario, moment, robot, arcs, y_down)
+    draw_window(moment, window)
+    draw_terms(moment, terms)
+    return figure_of(arcs)
 
 
 def draw_candidates(scenario: Scenario, moment: Moment, robot: RobotLimits, ax: "Axes | None" = None,

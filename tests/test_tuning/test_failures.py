@@ -3,6 +3,7 @@ from PIL import Image
 
 from adwa_jax.episode import Outcome
 from adwa_jax.presets import paper
+from scenarios.drawing import new_figure
 from tests.test_tuning.worlds import mixed_suite, part_of
 from tuning.evaluations import Evaluations
 from tuning.failures import failure_pictures, results_of, worst, worst_figure
@@ -45,6 +46,8 @@ def test_worst_are_drawn_side_by_side_with_axes_in_metres():
     assert [panel.get_title().split(":")[0] for panel in panels] == ["walled", "brief", "detour"]
     assert {(panel.get_xlabel(), panel.get_ylabel()) for panel in panels} == {("x [m]", "y [m]")}
     assert bar.get_ylabel() == "time before the end [s]"
+    axes = new_figure((9.0, 3.0)).subplots(1, 3)
+    assert worst_figure(suite, paper(), found, limit=3, axes=axes).axes[:3] == axes.tolist()
     assert len(worst_figure(suite, paper(), found, limit=1).axes) == 1  # it never drove: no time to show
 
 

@@ -19,6 +19,7 @@ from adwa_jax.presets import jackal
 from adwa_jax.rollout import RobotState
 from adwa_jax.route import Route
 from scenarios.drawing import ORANGE, new_figure
+from scenarios.errors import InputError
 from scenarios.generators import toy
 from scenarios.generators.assembly import grid_of
 from tuning import animation
@@ -124,6 +125,23 @@ def test_the_comparison_rings_the_traditional_paths_danger_points_only():
     assert the(right, "key point").get_xydata().tolist() == [[3.5, 0.5]]
     assert left.get_title() == "4 x 4, traditional A*\n4.50 m, 0 breaking and 2 danger points"
     assert right.get_title() == "4 x 4, improved A*\n6.00 m, 1 breaking and 0 danger points"
+
+
+def test_comparisons_are_drawn_on_given_axes_each_with_a_legend_of_its_own():
+    axes = new_figure((8.0, 8.0)).subplots(2, 2)
+    compare_plans([Comparison("4 x 4", GRID, TRADITIONAL, IMPROVED)], axes[0])
+    driven = Replay(SCENARIO, PLAN, episode_of(Outcome.REACHED), trace_of(), jackal())
+    compare_drives({"one": driven, "other": driven}, axes=axes[1].tolist())
+    assert [ax.get_title().split("\n")[0] for ax in axes[0]] == ["4 x 4, traditional A*", "4 x 4, improved A*"]
+    assert [ax.get_title().split(":")[0] for ax in axes[1]] == ["one", "other"]
+    assert all(ax.get_legend() is not None for ax in axes.flat)
+    assert not axes[0, 0].get_figure().legends
+
+
+def test_other_axes_than_a_figure_has_panels_are_refused():
+    axes = new_figure((8.0, 8.0)).subplots(2, 2)
+    with pytest.raises(InputError, match=r"^axes: 4; this figure has 2 panels; give as many, or none$"):
+        compare_plans([Comparison("4 x 4", GRID, TRADITIONAL, IMPROVED)], axes)
 
 
 def test_several_maps_stand_in_columns():

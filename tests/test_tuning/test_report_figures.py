@@ -192,6 +192,19 @@ def test_sweeps_have_a_row_a_parameter_and_a_column_an_objective_with_intervals(
         assert default.get_xdata()[0] == 0.1
 
 
+def test_axes_that_are_given_are_drawn_on(training):
+    axes = new_figure((9.0, 12.0)).subplots(4, 4)
+    front_figure(findings(), training, axes=axes.ravel()[:6])
+    optimism_figure(findings(), axes[2])
+    sweep_figure(GOALS, training, sweeps(training), axes[3])
+    one = Goals(GOALS.objectives[:1])
+    judged = [replace(member, training=replace(member.training, objectives=member.training.objectives[:1]),
+                      held_out=None) for member in (findings().default, *findings().front)]  # fmt: skip
+    front_figure(replace(findings(), goals=one, default=judged[0], front=tuple(judged[1:])), training, axes=axes[1, 2])
+    assert [ax.has_data() for ax in axes.ravel()] == [True] * 7 + [False] + [True] * 8
+    assert not axes[0, 0].get_figure().legends
+
+
 def test_hypervolume_holds_its_value_until_the_next_generation():
     ax = new_figure((4, 3)).subplots()
     hypervolume_figure(findings().hypervolume, ax)

@@ -169,6 +169,9 @@ def test_axes_that_are_given_are_drawn_on():
              draw_terms(moment_of(), axes[5])]  # fmt: skip
     assert drawn == list(axes[3:])
     assert all(ax.has_data() for ax in axes)
+    axes = new_figure((9.0, 3.0)).subplots(1, 3)
+    assert decision_figure(SCENARIO, moment_of(), ROBOT, axes=axes).axes[:3] == axes.tolist()
+    assert all(ax.has_data() for ax in axes)
 
 
 def test_a_map_that_counts_rows_downwards_is_drawn_so():
