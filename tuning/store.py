@@ -1,4 +1,4 @@
-"""Evaluations on disk: a zarr group that xarray reads, written by tiles so that no kill leaves a wrong one.
+"""Evaluations on disk: a zarr group written by tiles so that no kill leaves a wrong one.
 
 A tile is one candidate on a range of scenarios, and one chunk. Its mark, written after it, holds a checksum of it and
 of the candidate's constants: what is torn, damaged or of other constants is not done.
@@ -11,20 +11,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from itertools import groupby, product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import zarr
 
-from adwa_jax.episode import Outcome
 from adwa_jax.metrics import Measures, PlannedMeasures
 from scenarios.errors import InputError
 from tuning.console import UNITS
 from tuning.evaluations import Evaluations
-from tuning.weights_file import UNITS as CONSTANT_UNITS
-
-if TYPE_CHECKING:
-    import xarray
 
 WHOLE = ("outcome", "brakings", "replans", "key_point_count", "expansions", "breaking_points",
          "danger_points", *(f"planned_{name}" for name in PlannedMeasures._fields))  # fmt: skip
@@ -36,7 +31,6 @@ FIGURES: dict[str, type] = {
                  "hit_while_stopped", "brakings", "replans", *Measures._fields)
 }  # fmt: skip
 TILE_WIDTH = 64  # scenarios of a tile: seconds of work, and a file of a few kilobytes
-SUITES = ("training", "held_out")  # of a job
 MARK = 1 << 32  # beside the checksum, so that a mark is never 0
 
 
@@ -116,30 +110,6 @@ class Store:
         missing = count - len(self._marks)
         if missing > 0:
             self._marks = np.concatenate([self._marks, np.zeros((missing, len(self.tiles)), np.uint64)])
-
-
-def open_evaluations(folder: str | Path, suite: str = "training") -> "xarray.Dataset":
-    """The evaluations of a job's folder, by name: a variable [candidate, scenario] for every figure, with its unit, and
-    `done`. Each candidate's constants, with their units, and generation are coordinates.
-
-    What is not done, of candidates dropped early, is NaN; where all is done, whole figures are whole numbers. suite:
-    "training" or "held_out".
-    """
-    import xarray
-
-    if suite not in SUITES:
-        raise InputError(f"suite: {suite!r}; a job has the parts {' and '.join(SUITES)}; name one of them")
-    found, names = read_store(Path(folder) / f"{suite}.zarr")
-    dimensions = ("candidate", "scenario")
-    variables: dict[str, Any] = {name: (dimensions, _masked(values, found.done), {"units": UNITS.get(name, "")})
-                                 for name, values in found.columns.items()}  # fmt: skip
-    variables["outcome"][2].update(flag_values=[int(outcome) for outcome in Outcome],
-                                   flag_meanings=" ".join(outcome.name for outcome in Outcome))  # fmt: skip
-    constants = {name: ("candidate", found.values[:, index], {"units": CONSTANT_UNITS.get(name, "")})
-                 for index, name in enumerate(found.parameters)}  # fmt: skip
-    coordinates = {"candidate": np.arange(len(found.values)), "scenario": list(names),
-                   "generation": ("candidate", found.generation), **constants}  # fmt: skip
-    return xarray.Dataset({**variables, "done": (dimensions, found.done)}, coordinates)
 
 
 def as_evaluations(path: Path) -> Evaluations:
@@ -237,10 +207,6 @@ def _mark(values: np.ndarray, figures: np.ndarray) -> int:
 def _columns(block: np.ndarray, figures: Sequence[str]) -> dict[str, np.ndarray]:
     """Figures [W, S, M] by name, in the engine's types."""
     return {name: block[..., index].astype(FIGURES[name]) for index, name in enumerate(figures)}
-
-
-def _masked(values: np.ndarray, done: np.ndarray) -> np.ndarray:
-    return values if done.all() else np.where(done, values.astype(np.float64), np.nan)
 
 
 def _runs(rows: np.ndarray) -> Iterator[slice]:

@@ -16,11 +16,12 @@ from scenarios.errors import InputError
 from scenarios.suite import make_suite
 from tests.test_tuning.jobs import CANDIDATES, JOB, SCENARIOS, in_small_pieces, pairs_driven, results_of, written
 from tuning import racing, tiled_judge
+from tuning.dataset import open_evaluations
 from tuning.evaluate import evaluate
 from tuning.job_folder import events_of, locked
 from tuning.plans_only import PLANNED
 from tuning.run_job import open_job, read_setup, report_job, resume_job, run_job
-from tuning.store import FIGURES, as_evaluations, open_evaluations, read_store
+from tuning.store import FIGURES, as_evaluations, read_store
 from tuning.weights_file import load_weights
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -100,8 +101,17 @@ def test_the_dataset_has_dimensions_units_and_a_table(whole):
     assert (dataset["length"].units, dataset["jerk"].units) == ("m", "m/s³")
     assert dataset["outcome"].dtype == np.int32
     assert dataset["clearance"].dims == ("candidate",)
-    assert dataset["clearance"].units == ""  # a weight
+    assert dataset["clearance"].units == "1"  # a weight
+    described = {**dataset.variables}
+    assert all(variable.attrs["long_name"] for variable in described.values())
+    assert {name for name, variable in described.items() if "units" not in variable.attrs} == {"candidate", "scenario"}
+    assert dataset.attrs == {"title": f"{whole.name}: training", "missing": "not driven"}
     assert dict(open_evaluations(whole, "held_out").sizes)["scenario"] == 3
+
+
+def test_a_job_has_no_other_parts_than_two(tmp_path):
+    with pytest.raises(InputError, match=r"suite: 'heldout'; a job has the parts training and held_out; name one"):
+        open_evaluations(tmp_path, "heldout")
 
 
 def test_the_table_has_a_row_an_episode_under_its_candidate_and_scenario(whole):

@@ -8,7 +8,7 @@ from adwa_jax.presets import paper
 from scenarios.errors import InputError
 from tests.test_tuning.worlds import mixed_suite, part_of
 from tuning.evaluate import evaluate
-from tuning.store import FIGURES, Store, as_evaluations, open_evaluations, read_store
+from tuning.store import FIGURES, Store, as_evaluations, read_store
 
 VALUES = np.array([[0.1, 2.0], [0.3, 4.0], [0.5, 6.0]])
 NAMES = [f"world-{index}" for index in range(70)]  # two tiles, of 64 and of 6
@@ -86,11 +86,6 @@ def test_a_damaged_description_is_one_line(store, damage):
     damage(store.path / "zarr.json")
     with pytest.raises(InputError, match=r"damaged \(.*\); .*; remove it, and resume the job"):
         opened(store)
-
-
-def test_a_job_has_no_other_parts_than_two(tmp_path):
-    with pytest.raises(InputError, match=r"suite: 'heldout'; a job has the parts training and held_out; name one"):
-        open_evaluations(tmp_path, "heldout")
 
 
 def test_what_a_killed_process_left_unfinished_is_removed(store):
