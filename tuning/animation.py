@@ -24,6 +24,7 @@ from scenarios.drawing import (
     VERMILLION,
     draw_ends,
     draw_squares,
+    figure_legend,
     new_figure,
 )
 from scenarios.errors import InputError
@@ -46,6 +47,7 @@ from tuning.figures import (
 MOST_FRAMES = 150
 FRAME_RATE = 12.0  # pictures a second, at most
 DPI = 90
+LEGEND = 0.75  # [inch]
 LAST_SHOWN = 2.0  # [s]
 AHEAD = 1.0  # [s] of each mover's way that is drawn
 Progress = Callable[[int, int], None]  # (pictures done, of how many)
@@ -84,13 +86,16 @@ class _Film:
         self.outcome, self.title = Outcome(int(episode.outcome)), prefixed(title)
         self.start_heading = float(np.asarray(scenario.start)[2])
         points = drive_points(scenario, plan, trace)
-        self.figure = new_figure(used_map_size(scenario.grid, points, legend=0.0))
+        self.figure = new_figure(used_map_size(scenario.grid, points, legend=LEGEND))
         self.ax = draw_used_map(scenario.grid, points, self.figure.subplots(), y_down)
         self._draw_fixed(scenario, plan, episode)
         self._draw_moving(scenario, robot)
+        figure_legend(self.figure, [self.ax])
         self.show(0)
-        self.figure.canvas.draw()
-        self.figure.set_layout_engine("none")  # laid out once, or the map would tremble
+        self.figure.set_dpi(DPI)
+        for _ in range(2):  # the second knows how large the first has made the map
+            self.figure.draw_without_rendering()
+        self.figure.set_layout_engine("none")  # laid out before it moves, or the map would tremble
 
     def _draw_fixed(self, scenario: Scenario, plan: Plan, episode: Episode) -> None:
         draw_hidden_cells(scenario, self.trace, self.ax)
@@ -107,16 +112,20 @@ class _Film:
         ax = self.ax
         style: dict[str, Any] = {"edgecolor": BLACK, "linewidth": 0.8}
         radii = np.asarray(scenario.movers.radius)
-        self.movers = [Circle((0, 0), float(size), facecolor=SKY, zorder=3.5, **style) for size in radii]
-        self.ahead = [ax.plot([], [], color=BLUE, linewidth=1.2, zorder=3.4)[0] for _ in radii]
-        (self.driven,) = ax.plot([], [], color=VERMILLION, linewidth=2.0, zorder=6)
+        self.movers = [Circle((0, 0), float(size), facecolor=SKY, zorder=3.5, label="_" if index else "mover", **style)
+                       for index, size in enumerate(radii)]  # fmt: skip
+        self.ahead = [ax.plot([], [], color=BLUE, linewidth=1.2, zorder=3.4,
+                              label="_" if index else f"its way, {AHEAD:g} s ahead")[0]
+                      for index in range(len(radii))]  # fmt: skip
+        (self.driven,) = ax.plot([], [], color=VERMILLION, linewidth=2.0, zorder=6, label="driven path")
         (self.target,) = ax.plot([], [], linestyle="none", marker="o", markersize=12, markerfacecolor="none",
-                                 markeredgecolor=BLACK, zorder=7)
+                                 markeredgecolor=BLACK, zorder=7, label="local target")
         for disc in self.movers:
             ax.add_patch(disc)
         self.radius = float(robot.radius) if robot else 0.012 * max(np.ptp(ax.get_xlim()), np.ptp(ax.get_ylim()))
         self.offsets = robot.disc_offsets if robot else (0.0,)
-        self.robot = draw_outline(np.zeros((len(self.offsets), 2)), self.radius, ax, facecolor=VERMILLION, **style)
+        self.robot = draw_outline(np.zeros((len(self.offsets), 2)), self.radius, ax, label="robot",
+                                  facecolor=VERMILLION, **style)
         (self.nose,) = ax.plot([], [], color=BLACK, linewidth=1.5, zorder=9.1)
         (self.crash,) = ax.plot([], [], linestyle="none", marker="X", markersize=13, markerfacecolor=VERMILLION,
                                 markeredgecolor=BLACK, zorder=10)
@@ -205,7 +214,6 @@ def _picture(film: _Film, moment: int) -> Any:
     from PIL import Image
 
     film.show(moment)
-    film.figure.set_dpi(DPI)
     canvas = FigureCanvasAgg(film.figure)
     canvas.draw()
     return Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3])
