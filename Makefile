@@ -10,7 +10,7 @@ demo: $(STAMP)
 	$(BIN)/adwa demo --out out/demo
 
 test: $(STAMP)
-	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile
+	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile --no-loadscope-reorder
 
 # Beside other programs, some of which are installed for it.
 bench: $(STAMP)
