@@ -1,5 +1,7 @@
-"""A job's evaluations by name: an `xarray.Dataset` with dimensions, units and long names, for one's own analysis."""
+"""What was driven as an `xarray.Dataset`: named dimensions, units and long names, for one's own analysis."""
 
+from collections.abc import Mapping
+from enum import IntEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -7,8 +9,10 @@ import numpy as np
 
 from adwa_jax.episode import Outcome
 from scenarios.errors import InputError
+from scenarios.feasibility import Feasibility
 from tuning.console import UNITS
 from tuning.job_folder import HELD_OUT, TRAINING
+from tuning.results import Results
 from tuning.store import read_store
 from tuning.weights_file import UNITS as CONSTANT_UNITS
 
@@ -60,12 +64,7 @@ def open_evaluations(folder: str | Path, suite: str = "training") -> "xarray.Dat
         raise InputError(f"suite: {suite!r}; a job has the parts {' and '.join(PARTS)}; name one of them")
     found, names = read_store(Path(folder) / PARTS[suite])
     both = ("candidate", "scenario")
-    variables: dict[str, Any] = {
-        name: (both, _masked(values, found.done), _attributes(LONG_NAMES[name], UNITS.get(name)))
-        for name, values in found.columns.items()
-    }
-    variables["outcome"][2].update(flag_values=[int(outcome) for outcome in Outcome],
-                                   flag_meanings=" ".join(outcome.name for outcome in Outcome))  # fmt: skip
+    variables = _figures(both, {name: _masked(values, found.done) for name, values in found.columns.items()})
     variables["done"] = both, found.done, _attributes("whether the episode was driven")
     candidates = {
         "candidate": ("candidate", np.arange(len(found.values)), {"long_name": "candidate; 0: the default constants"}),
@@ -76,6 +75,28 @@ def open_evaluations(folder: str | Path, suite: str = "training") -> "xarray.Dat
     scenarios = {"scenario": ("scenario", list(names), {"long_name": f"scenario of the {suite} suites"})}
     described = {"title": f"{Path(folder).resolve().name}: {suite}", "missing": "not driven"}
     return xarray.Dataset(variables, {**candidates, **scenarios}, described)
+
+
+def results_dataset(results: Results) -> "xarray.Dataset":
+    """An evaluation: a variable [scenario] for every figure, with its `units` and `long_name`."""
+    import xarray
+
+    variables = _figures(("scenario",), {"outcome": results.outcome, **results.measures})
+    if results.feasibility is not None:
+        described = _flags("what is proven of the scenario", Feasibility)
+        variables["feasibility"] = "scenario", results.feasibility, described
+    return xarray.Dataset(variables, {"scenario": list(results.names)}, {"title": results.suite})
+
+
+def _figures(dimensions: tuple[str, ...], columns: Mapping[str, np.ndarray]) -> dict[str, Any]:
+    described = {name: (dimensions, values, _attributes(LONG_NAMES[name], UNITS.get(name)))
+                 for name, values in columns.items()}  # fmt: skip
+    return described | {"outcome": (dimensions, columns["outcome"], _flags(LONG_NAMES["outcome"], Outcome))}
+
+
+def _flags(long_name: str, kinds: type[IntEnum]) -> dict[str, Any]:
+    return _attributes(long_name) | {"flag_values": [int(kind) for kind in kinds],
+                                     "flag_meanings": " ".join(kind.name for kind in kinds)}  # fmt: skip
 
 
 def _attributes(long_name: str, units: str | None = None) -> dict[str, str]:

@@ -8,6 +8,7 @@ import pytest
 from adwa_jax.episode import Outcome
 from scenarios.feasibility import Feasibility
 from tuning.console import results_table
+from tuning.dataset import results_dataset
 from tuning.intervals import wilson
 from tuning.results import OVER_ALL, Results
 
@@ -41,6 +42,19 @@ def test_means_are_over_successes_and_those_with_success_in_them_over_all():
     assert MIXED.means() == {"time": 20.0, "spl": 0.375, "hit_while_stopped": 0.25, "barn_score": 0.1875,
                              "least_clearance": pytest.approx(0.3)}  # fmt: skip
     assert {"spl", "barn_score", "replans", "hit_while_stopped"} == set(OVER_ALL)
+
+
+def test_an_evaluation_opens_as_a_dataset_with_units_and_a_table():
+    dataset = results_dataset(replace(MIXED, feasibility=np.array([0, 2, 0, 1], np.int32)))
+    assert dict(dataset.sizes) == {"scenario": 4}
+    assert dataset.attrs == {"title": "some suite"}
+    assert (dataset["time"].units, dataset["spl"].units) == ("s", "1")
+    assert all(variable.long_name for variable in dataset.data_vars.values())
+    assert dataset["outcome"].flag_meanings.split()[Outcome.HIT_MOVER] == "HIT_MOVER"
+    assert dataset["feasibility"].flag_meanings.split() == [kind.name for kind in Feasibility]
+    frame = dataset.to_dataframe()
+    assert frame.index.tolist() == ["s-0", "s-1", "s-2", "s-3"]
+    assert frame.loc["s-1", "time"] == 99.0
 
 
 def test_without_a_success_a_mean_over_successes_is_null():
