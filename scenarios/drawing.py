@@ -5,7 +5,7 @@ that gets no axes makes a figure outside pyplot's list; it shows no window, and 
 Dimension letters: H, W map; M movers; T times.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import ceil
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -219,25 +219,33 @@ def figure_of(ax: "Axes") -> "Figure":
     return ax.get_figure(root=True)  # pyright: ignore[reportReturnType]
 
 
-def legend_below(ax: "Axes", columns: int = 3) -> None:
-    """A legend under the x axis, where it hides nothing."""
+def legend_below(ax: "Axes", columns: int = 3, kinds: Mapping[str, Any] | None = None) -> None:
+    """A legend under the x axis, where it hides nothing. kinds: by label what stands in it, if not what `ax` shows."""
     from matplotlib.transforms import ScaledTranslation
 
     below_labels = ax.transAxes + ScaledTranslation(0.0, -0.42, figure_of(ax).dpi_scale_trans)
-    ax.legend(loc="upper center", bbox_to_anchor=(0.5, 0.0), bbox_transform=below_labels, borderaxespad=0.0,
-              ncols=columns, fontsize=FONT - 1, frameon=False, handler_map=_handlers())
+    shown = legend_kinds([ax]) if kinds is None else kinds
+    ax.legend(list(shown.values()), list(shown), loc="upper center", bbox_to_anchor=(0.5, 0.0),
+              bbox_transform=below_labels, borderaxespad=0.0, ncols=columns, fontsize=FONT - 1, frameon=False,
+              handler_map=_handlers())
 
 
 def figure_legend(figure: "Figure", axes: Sequence["Axes"]) -> None:
     """One legend under all axes, each kind of thing once."""
-    kinds = {}
-    for ax in axes:
-        for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
-            kinds.setdefault(label, handle)
+    kinds = legend_kinds(axes)
     rows = max(1, ceil(len(kinds) / (figure.get_figwidth() / 1.5)))
     columns = max(1, ceil(len(kinds) / rows))
     figure.legend(list(kinds.values()), list(kinds), loc="outside lower center", ncols=columns, fontsize=FONT - 1,
                   frameon=False, handler_map=_handlers())
+
+
+def legend_kinds(axes: Sequence["Axes"]) -> dict[str, Any]:
+    """What the axes show, by label, each kind of thing once."""
+    kinds: dict[str, Any] = {}
+    for ax in axes:
+        for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
+            kinds.setdefault(label, handle)
+    return kinds
 
 
 @jax.jit

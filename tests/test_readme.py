@@ -8,6 +8,8 @@ import pytest
 
 from adwa_jax import Outcome, Status, drive, paper, plan
 from scenarios.suite import make_suite
+from tests.test_tuning.jobs import CANDIDATES, SCENARIOS, in_small_pieces, written
+from tuning.run_job import run_job
 from tuning.weights_file import load_weights
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -17,11 +19,24 @@ README = (ROOT / "README.md").read_text()
 PYTHON = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
 
 
-@pytest.mark.parametrize("example", PYTHON, ids=["first screen", "many weights"])
+@pytest.mark.parametrize("example", PYTHON[:2], ids=["first screen", "many weights"])
 def test_the_python_examples_run_and_print_outcomes(example, capsys):
     exec(compile(example, "README.md", "exec"), {})
     printed = capsys.readouterr().out
     assert printed.count("'REACHED': ") == 2
+
+
+def test_the_example_with_a_finished_job_runs(tmp_path, monkeypatch, capsys):
+    in_small_pieces(monkeypatch.setattr)
+    monkeypatch.chdir(tmp_path)
+    run_job(written(tmp_path), tmp_path / "out" / "demo" / "job_0", quiet=True)
+    (example,) = PYTHON[2:]
+    found = {}
+    exec(compile(example, "README.md", "exec"), found)
+    assert list(found["front"].columns[:2]) == ["clearance", "velocity"]
+    assert len(found["episodes"]) == CANDIDATES * SCENARIOS
+    assert (tmp_path / "front.png").exists()
+    assert capsys.readouterr().out.splitlines()[1].startswith("s [")
 
 
 def test_the_first_example_is_short():

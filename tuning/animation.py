@@ -105,6 +105,8 @@ class _Film:
         if len(key_points):
             draw_polyline(key_points, self.ax, "--", "planned path")
         self.squares = draw_squares(scenario.squares, self.ax)
+        if self.squares:
+            self.squares[0].set_label("unknown, filled once sensed")
 
     def _draw_moving(self, scenario: Scenario, robot: RobotLimits | None) -> None:
         from matplotlib.patches import Circle

@@ -11,10 +11,11 @@ from tuning.console import progress_bar
 from tuning.findings import Findings, Member
 from tuning.finished_job import FinishedJob, finished, held_out_rows
 from tuning.job_checks import Setup
-from tuning.job_folder import HELD_OUT, TRAINING, Log, remembered
+from tuning.job_folder import HELD_OUT, TRAINING, Log, home_of, remembered
 from tuning.nav2 import nav2_text
 from tuning.outputs import write_whole
 from tuning.plans_only import known_of_plans
+from tuning.robot_file import SUFFIX
 from tuning.store import Store, as_evaluations
 from tuning.tiled_judge import TiledJudge
 from tuning.weights_file import weights_text
@@ -29,7 +30,7 @@ def conclude(folder: Path, setup: Setup, environment: dict[str, Any]) -> Finding
     done = finished(folder, setup)
     findings = done.findings
     preset = setup.space.preset(_recommended(findings).values)
-    write_whole(folder / RECOMMENDED, recommended_text(setup, findings, preset))
+    write_whole(folder / RECOMMENDED, recommended_text(setup, findings, preset, home_of(environment)))
     write_whole(folder / NAV2, nav2_text(preset))
     write_report(folder, setup.job, findings, done.training, done.held_out, done.held_out_rows, remembered(folder),
                  environment, _gallery(folder, done))  # fmt: skip
@@ -49,10 +50,11 @@ def drive_held_out(folder: Path, setup: Setup, log: Log, quiet: bool) -> None:
     log.write("held out", candidates=len(rows), driven=judge.driven, seconds=round(time.perf_counter() - began, 3))
 
 
-def recommended_text(setup: Setup, findings: Findings, preset: Preset) -> str:
-    """The recommended constants as a file of weights, with what is known of them."""
+def recommended_text(setup: Setup, findings: Findings, preset: Preset, home: Path) -> str:
+    """The recommended constants as a file of weights, with what is known of them. home: of the job file's paths."""
     choice, planner = findings.choices[findings.recommended], setup.job.planner
-    options = [f"--preset {planner.preset}", *([f"--robot {planner.robot}"] if planner.robot else []),
+    robot = str(home / planner.robot) if planner.robot and planner.robot.endswith(SUFFIX) else planner.robot
+    options = [f"--preset {planner.preset}", *([f"--robot {robot}"] if robot else []),
                *([f"--v-max {planner.v_max:g}"] if planner.v_max else [])]  # fmt: skip
     lines = [f"Tuned by the job {setup.job.name!r}, by the rule {choice.rule}: {choice.reason}",
              *success_lines(findings), f"Use: adwa evaluate {' '.join(options)} --weights recommended.toml"]

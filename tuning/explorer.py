@@ -9,14 +9,17 @@ from typing import Any
 
 import numpy as np
 
+from scenarios.errors import InputError
 from tuning.evaluations import Evaluations
 from tuning.findings import Findings
-from tuning.report_figures import front_figure, parallel_figure
-from tuning.report_interactive import available, front_plot, parallel_plot
+from tuning.report_figures import BREAKING, front_figure, parallel_figure
+from tuning.report_interactive import CANDIDATES, available, front_plot, parallel_plot
 from tuning.report_summary import front_table
 
 HOW_TO_BRUSH = "Drag along an axis: the members that pass there are listed here."
-LEFT_OUT = "Not a member of the front: click a blue point, or the star."
+NONE_PASSES = "No member passes in all of the brushed ranges."
+LEFT_OUT = "The default constants, with which the tables compare. Click a blue point, filled or hollow, or the star."
+WIDTH = 900  # [px]
 LIKE_TABLES = "jp-RenderedHTMLCommon"  # the style of a notebook's tables
 
 
@@ -28,35 +31,46 @@ class MemberPicker:
     def __init__(self, findings: Findings, training: Evaluations, show: Callable[[int], Any] | None = None):
         self.member = findings.choices[findings.recommended].member + 1
         self._show, self._count = show, len(findings.front)
+        self._output: Any = None
         if not clickable():
             self._shown: Any = explored_front(findings, training)
             return
         import ipywidgets
         import plotly.graph_objects as go
 
-        plot: Any = go.FigureWidget(front_plot(findings, training))
+        plot: Any = go.FigureWidget(front_plot(findings, training), layout={"width": WIDTH})
         for trace in plot.data:
             trace.on_click(self._clicked)
+            if trace.name in (CANDIDATES, BREAKING):  # or they would catch clicks on members that lie on them
+                trace.update(hoverinfo="skip", hovertemplate=None)
         self._heading = ipywidgets.HTML("Click a member.")
         self._output = ipywidgets.Output()
         self._shown = ipywidgets.VBox([plot, self._heading, self._output])
 
     def choose(self, number: int) -> None:
-        """What a click on the member does."""
-        self._output.clear_output()
+        """What a click on the member does. InputError for a number that the tables do not have."""
         if not 1 <= number <= self._count:
-            self._heading.value = LEFT_OUT
-            return
+            raise InputError(f"member: {number}; must be from 1 to {self._count}; choose one of them")
         self.member = number
+        if self._show is None:
+            return
+        if self._output is None:
+            self._show(number)
+            return
+        self._output.clear_output()
         self._heading.value = f"<b>Member {number}</b> …"
         with self._output:
-            if self._show is not None:
-                self._show(number)
+            self._show(number)
         self._heading.value = f"<b>Member {number}</b>"
 
     def _clicked(self, trace: Any, points: Any, state: Any) -> None:
         for index in points.point_inds[:1]:  # called for every trace, of which one was hit
-            self.choose(int(trace.customdata[index]))
+            number = int(trace.customdata[index])
+            if number:
+                self.choose(number)
+            else:
+                self._output.clear_output()
+                self._heading.value = LEFT_OUT
 
     def _ipython_display_(self) -> None:
         from IPython.display import display
@@ -72,12 +86,14 @@ def brush_members(findings: Findings) -> Any:
     import plotly.graph_objects as go
 
     plot: Any = go.FigureWidget(parallel_plot(findings))
+    plot.layout.width = max(WIDTH, 80 * len(plot.data[0].dimensions) + 200)  # drawn out of sight, it would be narrow
     table = ipywidgets.HTML(HOW_TO_BRUSH).add_class(LIKE_TABLES)
     lines = plot.data[0]
 
     def brushed(*_: Any) -> None:
         kept = passing(lines.dimensions)
-        table.value = HOW_TO_BRUSH if len(kept) == len(findings.front) else front_table(findings, kept)
+        whole = len(kept) == len(findings.front)
+        table.value = HOW_TO_BRUSH if whole else front_table(findings, kept) if kept else NONE_PASSES
 
     lines.on_change(brushed, "dimensions")
     return ipywidgets.VBox([plot, table])

@@ -41,6 +41,7 @@ from scenarios.drawing import (
     figure_legend,
     figure_of,
     legend_below,
+    legend_kinds,
     map_size,
     mover_ways,
     new_figure,
@@ -425,12 +426,11 @@ def panels_of(axes: "Panels", count: int) -> list["Axes"]:
 
 
 def legend_of(axes: Sequence["Axes"], alone: bool) -> None:
-    """One under the figure where the axes stand `alone` in it, else each one's under its own x axis."""
+    """One of all axes: under the figure where they stand `alone` in it, else under the last of them."""
     if alone:
         figure_legend(figure_of(axes[0]), axes)
-        return
-    for ax in axes:
-        _own_legend(ax)
+    else:
+        _legend_under(axes[-1], axes)
 
 
 def prefixed(title: str) -> str:
@@ -438,19 +438,20 @@ def prefixed(title: str) -> str:
     return f"{title}: " if title else ""
 
 
-def _own_legend(ax: "Axes") -> None:
-    """Below the labels of the x axis, in as many columns as fit; none where nothing has a name."""
+def _legend_under(ax: "Axes", axes: Sequence["Axes"]) -> None:
+    """Of all axes, each kind of thing once, below the x axis's labels in as many columns as fit; none of no kinds."""
     from matplotlib.transforms import ScaledTranslation
 
-    names = [name for name in ax.get_legend_handles_labels()[1] if name]
-    if not names:
+    kinds = legend_kinds(axes)
+    if not kinds:
         return
     figure = figure_of(ax)
     inches = figure.get_figwidth() * ax.get_position().width
-    legend_below(ax, columns=max(1, min(len(names), int(inches / (0.065 * max(map(len, names)) + 0.5)))))
+    columns = max(1, min(len(kinds), int(inches / (0.065 * max(map(len, kinds)) + 0.5))))
     labels = ax.xaxis.get_tightbbox()
     down = (ax.bbox.y0 - labels.y0) / figure.dpi if labels else 0.0
     below = ax.transAxes + ScaledTranslation(0.0, -down - 0.06, figure.dpi_scale_trans)
+    legend_below(ax, columns, kinds)
     ax.get_legend().set_bbox_to_anchor((0.5, 0.0), below)  # pyright: ignore[reportOptionalMemberAccess]
 
 

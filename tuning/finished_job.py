@@ -35,8 +35,8 @@ class FinishedJob:
     def member(self, number: int) -> Member:
         """InputError for a number that no table has."""
         most = len(self.findings.front)
-        if not 0 <= number <= most:
-            raise InputError(f"member: {number}; must be from 1 to {most}, or 0 for the default; choose one of them")
+        if not isinstance(number, int | np.integer) or not 0 <= number <= most:
+            raise InputError(f"member: {number!r}; must be from 1 to {most}, or 0 for the default; choose one of them")
         return self.findings.front[number - 1] if number else self.findings.default
 
     def choosing(self, number: int) -> Findings:

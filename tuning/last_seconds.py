@@ -31,13 +31,15 @@ if TYPE_CHECKING:
 
 ROOM = 1.5  # [m] shown around the driven path
 LEAST_HALF = 2.0  # [m] half the side of what is shown, at least
+LEAST_WAY = 0.4  # [m] driven that is shown, at least
 ARROW = 1.0  # [s] of motion that an arrow stands for
 COLOURS = "cividis"  # equal steps in lightness: also for the colour-blind, and in grey
 
 
 def draw_last_seconds(driven: Replay, ax: "Axes", seconds: float = 4.0, title: str = "", y_down: bool = False) -> Any:
     """Map, sensed and unsensed obstacles, planned path and last route; what was driven in the last `seconds`, movers
-    with their trails and an arrow for the way of the next second, the robot and its local target at the end.
+    with their trails and an arrow for the way of the next second, the robot and its local target at the end. Where it
+    stood for long, the robot's path begins `LEAST_WAY` before the end, however long ago.
 
     Dots mark whole seconds. Returns what a colour bar of the time [s] needs, None for a robot that never drove: then
     all of the map that is in use is shown.
@@ -46,7 +48,8 @@ def draw_last_seconds(driven: Replay, ax: "Axes", seconds: float = 4.0, title: s
     draw_used_map(scenario.grid, drive_points(scenario, driven.plan, trace), ax, y_down)
     ax.set_facecolor(OCCUPIED)  # beyond the map
     first = max(steps - round(seconds / step_of(driven)), 0) if steps else 0
-    path = driven_path(scenario, trace)[first:]
+    whole = driven_path(scenario, trace)
+    path = whole[min(first, _begins(whole)) :]
     if steps:
         _crop(path, ax, y_down)
         scenario = _squares_in_view(scenario, ax)
@@ -63,7 +66,8 @@ def draw_last_seconds(driven: Replay, ax: "Axes", seconds: float = 4.0, title: s
     times = (np.arange(first, steps + 1) - steps) * step_of(driven)
     shades = {"cmap": COLOURS, "vmin": -seconds, "vmax": 0.0}
     _draw_movers(driven, first, times, ax, shades)
-    shaded = _draw_trail(path, times, ax, shades, width=3.0)
+    since = (np.arange(-len(path) + 1, 1)) * step_of(driven)
+    shaded = _draw_trail(path, since, ax, shades, width=3.0)
     shaded.set_label("driven path")
     _draw_robot(driven, path[-1], ax)
     _list_what_is_in_view(ax)
@@ -73,6 +77,12 @@ def draw_last_seconds(driven: Replay, ax: "Axes", seconds: float = 4.0, title: s
 def step_of(driven: Replay) -> float:
     """Control step [s] of a robot that drove."""
     return float(driven.episode.measures.time) / int(driven.trace.length)
+
+
+def _begins(path: np.ndarray) -> int:
+    """Where the last `LEAST_WAY` of a path [T + 1, 2] begin."""
+    left = np.cumsum(np.hypot(*np.diff(path, axis=0).T)[::-1])
+    return max(len(path) - 2 - int(np.searchsorted(left, LEAST_WAY)), 0)
 
 
 def _draw_robot(driven: Replay, position: np.ndarray, ax: "Axes") -> None:
@@ -104,6 +114,8 @@ def _draw_movers(driven: Replay, first: int, times: np.ndarray, ax: "Axes", shad
     if going.any():
         ax.quiver(*ways[-1][going].T, *(ARROW * velocity[going]).T, angles="xy", scale_units="xy", scale=1.0,
                   color=BLUE, width=0.008, zorder=4.5)
+        if (going & seen).any():
+            ax.plot([], [], color=BLUE, linewidth=1.0, marker=">", markersize=4, label="mover, next second")
 
 
 def _draw_trail(way: np.ndarray, times: np.ndarray, ax: "Axes", shades: dict[str, Any], width: float) -> Any:
@@ -155,8 +167,8 @@ def _list_what_is_in_view(ax: "Axes") -> None:
     for line in ax.lines:
         points = np.asarray(line.get_xydata())
         marks = line.get_linestyle() in ("None", "none")
-        if not (((points > low) & (points < high)).all(axis=1).any() if marks else
-                len(points) > 1 and line.get_path().intersects_bbox(view, filled=False)):  # fmt: skip
+        if len(points) and not (((points > low) & (points < high)).all(axis=1).any() if marks else
+                                len(points) > 1 and line.get_path().intersects_bbox(view, filled=False)):  # fmt: skip
             line.set_label("_")
     for drawn in ax.collections:
         paths = drawn.get_paths()

@@ -85,7 +85,8 @@ def _front(findings: Findings, training: Evaluations, plot: str) -> str:
         "held-out scenarios. The view is that of the members; candidates beyond it are not shown.",
     )  # fmt: skip
     how = "Point at a candidate to see its constants; the lists choose the axes." if plot else NO_PLOTLY
-    return "\n".join([picture, html.paragraph(how), plot, html.folded("As a table", summary.front_table(findings))])
+    told = f'<div class="screen">{html.paragraph(how)}</div>'
+    return "\n".join([picture, told, plot, html.folded("As a table", summary.front_table(findings))])
 
 
 def _parallel(findings: Findings) -> str:

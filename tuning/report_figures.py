@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 
 COLUMNS = 3  # panels side by side
 GREY = "#999999"
+BREAKING = "breaks a constraint"
 COLOURS = "cividis"  # equal steps in lightness: also for the colour-blind, and in grey
 SEED = 0  # of the resamples behind the intervals of a sweep
 DEFAULT = {"marker": "s", "markersize": 7, "color": BLACK}
@@ -58,11 +59,16 @@ def measure_name(statistic: Statistic) -> str:
 
 def axis_label(statistic: Statistic) -> str:
     """Name, unit, and which way is better."""
-    return f"{name_and_unit(statistic)}, {'less' if statistic.direction == 'min' else 'more'} is better"
+    return f"{axis_name(statistic)}, {'less' if statistic.direction == 'min' else 'more'} is better"
+
+
+def axis_name(statistic: Statistic) -> str:
+    """Name and unit, [1] where there is none."""
+    return f"{measure_name(statistic)} [{unit_of(statistic) or 1}]"
 
 
 def name_and_unit(statistic: Statistic) -> str:
-    """For axes and headings."""
+    """For headings."""
     unit = unit_of(statistic)
     return measure_name(statistic) + (f" [{unit}]" if unit else "")
 
@@ -99,7 +105,8 @@ def view_of(statistic: Statistic, values: np.ndarray, share: float = 0.12) -> tu
 def front_figure(findings: Findings, training: Evaluations | None = None, numbered: bool = False,
                  axes: "Panels | None" = None) -> "Figure":
     """Every pair of objectives: the front, the default constants and the recommended ones, a line from each to its
-    value on the held-out suite; all candidates in grey if `training` is given. One objective: by candidate.
+    value on the held-out suite; all candidates in grey if `training` is given, crosses where they break a constraint.
+    One objective: by candidate.
 
     numbered: members of the front carry the numbers that tables give them, from 1. axes: one a pair, or one.
     """
@@ -111,8 +118,8 @@ def front_figure(findings: Findings, training: Evaluations | None = None, number
     cloud = candidate_objectives(findings.goals, training) if training is not None else None
     for ax, (across, up) in zip(panels, pairs, strict=True):
         _show_members(findings, across, up, ax)
-        if cloud is not None:
-            _draw_candidates(cloud[:, [across, up]], ax)
+        if training is not None and cloud is not None:
+            _draw_candidates(cloud[:, [across, up]], breaking(findings.goals, training), ax)
         _draw_members(findings, across, up, ax)
         if numbered:
             _number_members(findings, across, up, ax)
@@ -134,10 +141,11 @@ def parallel_table(findings: Findings) -> tuple[list[str], np.ndarray]:
     return names, np.array(rows)
 
 
-def telling_objective(findings: Findings) -> int:
-    """The first objective in which the members differ."""
+def telling_objectives(findings: Findings) -> list[int]:
+    """Objectives by index, those first in which the members differ most: by their span over their largest value."""
     objectives = parallel_table(findings)[1][:, len(findings.parameters) :]
-    return int(np.argmax(np.nanmax(objectives, axis=0) > np.nanmin(objectives, axis=0)))
+    span = np.nanmax(objectives, axis=0) - np.nanmin(objectives, axis=0)
+    return np.argsort(-span / np.maximum(np.nanmax(np.abs(objectives), axis=0), 1e-9), kind="stable").tolist()
 
 
 def line_colours(count: int = 64) -> list[str]:
@@ -151,7 +159,7 @@ def line_colours(count: int = 64) -> list[str]:
 def parallel_figure(findings: Findings, ax: "Axes | None" = None) -> "Figure":
     """Parallel coordinates: one line a member of the front through its constants and its objectives on training.
 
-    Each axis runs over what is shown; the shade is the first objective in which they differ.
+    Each axis runs over what is shown; the shade is the objective in which they differ most.
     """
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import ListedColormap, Normalize
@@ -161,7 +169,7 @@ def parallel_figure(findings: Findings, ax: "Axes | None" = None) -> "Figure":
     ax = new_figure((max(0.62 * len(names) + 1.6, 5.0), 4.6)).subplots() if ax is None else ax
     low, high = np.nanmin(table, axis=0), np.nanmax(table, axis=0)
     lines = np.where(high > low, (table - low) / np.where(high > low, high - low, 1.0), 0.5)
-    shade = telling_objective(findings)
+    shade = telling_objectives(findings)[0]
     shaded = table[:, len(findings.parameters) + shade]
     shades = ScalarMappable(Normalize(np.nanmin(shaded), np.nanmax(shaded)), ListedColormap(line_colours()))
     for line, value in zip(lines[:-1], shaded[:-1], strict=True):
@@ -223,7 +231,7 @@ def sweep_figure(goals: Goals, training: Evaluations, found: Sequence[Sweep],
             ax.plot(values, points[:, 0], color=BLUE, marker="o", markersize=3, linewidth=1.4)
             ax.axvline(training.values[0, sweep.parameter], color=BLACK, linestyle="--", linewidth=0.9)
             name = training.parameters[sweep.parameter].replace("_", " ")
-            _label_axes(ax, name, name_and_unit(statistic))
+            _label_axes(ax, name, axis_name(statistic))
             _mark_rates(ax, None, statistic)
     return figure_of(panels[0])
 
@@ -301,8 +309,9 @@ def optimism_figure(findings: Findings, axes: "Panels | None" = None) -> "Figure
         _draw_against([findings.default], index, statistic, ax, DEFAULT | {"label": "default constants"})
         _draw_against([best], index, statistic, ax, CHOSEN | {"label": findings.picked})
         ends = np.array([*ax.get_xlim(), *ax.get_ylim()])
-        ax.axline((ends.min(), ends.min()), slope=1.0, color=GREY, linestyle="--", linewidth=1.0, zorder=0)
-        _label_axes(ax, f"training: {name_and_unit(statistic)}", f"held-out: {name_and_unit(statistic)}")
+        ax.axline((ends.min(), ends.min()), slope=1.0, color=GREY, linestyle="--", linewidth=1.0, zorder=0,
+                  label="equal on both")  # fmt: skip
+        _label_axes(ax, f"training: {axis_name(statistic)}", f"held-out: {axis_name(statistic)}")
         _mark_rates(ax, statistic, statistic)
         ax.set_title(axis_label(statistic).rpartition(", ")[2], fontsize="medium")
     legend_of(panels, axes is None)
@@ -338,6 +347,13 @@ def candidate_objectives(goals: Goals, evaluations: Evaluations) -> np.ndarray:
     whole = evaluations.rows(evaluations.complete)
     return np.stack([in_units(statistic, estimate(statistic, whole.columns, whole.done))
                      for statistic in goals.objectives], axis=1)  # fmt: skip
+
+
+def breaking(goals: Goals, evaluations: Evaluations) -> np.ndarray:
+    """[W'] bool: which of those candidates break a constraint."""
+    whole = evaluations.rows(evaluations.complete)
+    broken = goals.scores(whole.columns, whole.done).violation > 0.0
+    return broken if goals.constraints else np.zeros_like(broken)
 
 
 def _panels(count: int, height: float, columns: int = COLUMNS) -> list["Axes"]:
@@ -435,12 +451,14 @@ def _show_members(findings: Findings, across: int, up: int, ax: "Axes") -> None:
         limits(*view_of(statistic, values))
 
 
-def _draw_candidates(points: np.ndarray, ax: "Axes") -> None:
-    """Those [W, 2] within the view; one beyond it is left out rather than cut at the frame."""
+def _draw_candidates(points: np.ndarray, broken: np.ndarray, ax: "Axes") -> None:
+    """Those [W, 2] within the view; one beyond it is left out rather than cut at the frame. broken: [W] bool."""
     low, high = np.array([ax.get_xlim(), ax.get_ylim()]).T
     within = ((points >= low) & (points <= high)).all(axis=1)
-    ax.plot(*np.where(within[:, None], points, np.nan).T, linestyle="none", marker=".", markersize=4, color=GREY,
-            zorder=1, clip_on=False, label="candidate")  # fmt: skip
+    for kind, marker, shown in (("candidate", ".", within & ~broken), (BREAKING, "x", within & broken)):
+        if shown.any() or kind != BREAKING:
+            ax.plot(*np.where(shown[:, None], points, np.nan).T, linestyle="none", marker=marker, markersize=4,
+                    color=GREY, zorder=1, clip_on=False, label=kind)  # fmt: skip
 
 
 def _mark_rates(ax: "Axes", across: Statistic | None, up: Statistic | None) -> None:

@@ -11,13 +11,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from scenarios.drawing import BLACK, BLUE, ORANGE, VERMILLION
+from scenarios.drawing import BLACK, BLUE, VERMILLION
 from tuning.evaluations import Evaluations
 from tuning.findings import Findings, Judgement, Member
 from tuning.objectives import Goals, Statistic
 from tuning.report_figures import (
+    BREAKING,
     GREY,
     axis_label,
+    breaking,
     candidate_objectives,
     in_units,
     line_colours,
@@ -25,12 +27,13 @@ from tuning.report_figures import (
     name_and_unit,
     parallel_table,
     recommended,
-    telling_objective,
+    telling_objectives,
     unit_of,
     view_of,
 )
 
 PLACE = "front-plot"  # id of the plot's element
+CANDIDATES = "candidates"
 
 
 def available() -> bool:
@@ -49,22 +52,23 @@ def interactive_front(findings: Findings, training: Evaluations) -> tuple[str, s
 
 
 def front_plot(findings: Findings, training: Evaluations) -> Any:
-    """A plotly figure: choose its axes, point at a member for its number and constants. A point's `customdata` is its
-    member's number, 0 for the default, −1 for other candidates.
+    """A plotly figure of the two objectives in which members differ most: choose its axes, point at a member for its
+    number and constants. A point's `customdata` is its member's number, 0 for the default, −1 for other candidates.
     """
     import plotly.graph_objects as go
 
     kinds = _kinds(findings, training)
-    up = min(1, len(findings.goals.objectives) - 1)
-    figure = go.Figure([_scatter(kind, up) for kind in kinds])
+    across, up = sorted((telling_objectives(findings) * 2)[:2])
+    figure = go.Figure([_scatter(kind, across, up) for kind in kinds])
     labels = [axis_label(statistic) for statistic in findings.goals.objectives]
     ranges = [_range(statistic, kinds, index) for index, statistic in enumerate(findings.goals.objectives)]
     figure.update_layout(
         template="plotly_white", height=520, margin={"l": 60, "r": 20, "t": 70, "b": 60}, hovermode="closest",
-        paper_bgcolor="white", legend={"orientation": "h", "y": -0.16}, hoverlabel={"align": "left"},
-        xaxis={"title": {"text": labels[0]}, "range": ranges[0]},
+        paper_bgcolor="white", legend={"orientation": "h", "y": -0.16},
+        hoverlabel={"align": "left", "bgcolor": "white", "font": {"color": BLACK}},
+        xaxis={"title": {"text": labels[across]}, "range": ranges[across]},
         yaxis={"title": {"text": labels[up]}, "range": ranges[up]},
-        updatemenus=[_menu("x", labels, kinds, ranges, 0, 0.0), _menu("y", labels, kinds, ranges, up, 0.5)],
+        updatemenus=[_menu("x", labels, kinds, ranges, across, 0.0), _menu("y", labels, kinds, ranges, up, 0.5)],
     )  # fmt: skip
     return figure
 
@@ -77,7 +81,7 @@ def parallel_plot(findings: Findings) -> Any:
 
     names, table = parallel_table(findings)
     numbers = [*range(1, len(findings.front) + 1), 0]
-    shade = telling_objective(findings)
+    shade = telling_objectives(findings)[0]
     best = findings.choices[findings.recommended].member + 1
     named = {0: "default", best: f"★ {best} {findings.picked}"}
     ticks = sorted(numbers)
@@ -108,9 +112,12 @@ def _kinds(findings: Findings, training: Evaluations) -> list[_Kind]:
     goals, best, default = findings.goals, recommended(findings), findings.default
     others = [member for member in findings.front if member.row not in (best.row, default.row)]
     rest = np.isin(np.flatnonzero(training.complete), [member.row for member in (*others, best, default)], invert=True)
-    texts = [_constants(findings, values) for values in training.values[training.complete][rest]]
-    kinds = [_Kind("candidates", candidate_objectives(goals, training)[rest], texts, [-1] * len(texts),
-                   {"color": GREY, "size": 5, "symbol": "circle"})]  # fmt: skip
+    texts = np.array([_constants(findings, values) for values in training.values[training.complete]], object)
+    points, broken, kinds = candidate_objectives(goals, training), breaking(goals, training), []
+    for name, chosen, symbol in ((CANDIDATES, rest & ~broken, "circle"), (BREAKING, rest & broken, "x-thin-open")):
+        if chosen.any() or name == CANDIDATES:
+            style = {"color": GREY, "size": 5, "symbol": symbol}
+            kinds.append(_Kind(name, points[chosen], texts[chosen].tolist(), [-1] * int(chosen.sum()), style))
     for name, members, style in (
         ("front", others, {"color": BLUE, "size": 10, "symbol": "circle"}),
         ("default constants", [default], {"color": BLACK, "size": 11, "symbol": "square"}),
@@ -120,7 +127,7 @@ def _kinds(findings: Findings, training: Evaluations) -> list[_Kind]:
     unseen = [member for member in (*others, best, default) if member.held_out is not None]
     if unseen:
         judged = [member.held_out for member in unseen if member.held_out is not None]
-        style = {"color": ORANGE, "size": 9, "symbol": "circle-open"}
+        style = {"color": BLUE, "size": 9, "symbol": "circle-open"}
         kinds.append(_of_members(findings, "held out", unseen, judged, style))
     return kinds
 
@@ -138,10 +145,10 @@ def _points(goals: Goals, judgements: Sequence[Judgement]) -> np.ndarray:
                      for judged in judgements]).reshape(-1, len(goals.objectives))  # fmt: skip
 
 
-def _scatter(kind: _Kind, up: int) -> Any:
+def _scatter(kind: _Kind, across: int, up: int) -> Any:
     import plotly.graph_objects as go
 
-    return go.Scatter(x=_column(kind.points, 0), y=_column(kind.points, up), mode="markers", name=kind.name,
+    return go.Scatter(x=_column(kind.points, across), y=_column(kind.points, up), mode="markers", name=kind.name,
                       text=kind.texts, customdata=kind.numbers, marker=kind.style,
                       hovertemplate=f"<b>{kind.name}</b><br>%{{text}}<extra></extra>")  # fmt: skip
 
@@ -158,7 +165,7 @@ def _menu(axis: str, labels: list[str], kinds: list[_Kind], ranges: list[list[fl
 
 def _range(statistic: Statistic, kinds: list[_Kind], index: int) -> list[float]:
     """Of an axis: that of the members, as candidates far off would press them into a corner."""
-    values = np.concatenate([kind.points[:, index] for kind in kinds[1:]])
+    values = np.concatenate([kind.points[:, index] for kind in kinds if kind.name not in (CANDIDATES, BREAKING)])
     return list(view_of(statistic, values, share=0.1))
 
 

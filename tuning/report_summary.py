@@ -16,6 +16,8 @@ from tuning.report_html import table
 
 SUCCESS = Statistic("success", "max")
 NONE = "–"
+SEEN = (" Who chose them by these values has seen them: other scenarios tell how good the choice is "
+        "(adwa evaluate --weights, another seed).")  # fmt: skip
 
 
 def verdict(findings: Findings) -> str:
@@ -30,13 +32,23 @@ def verdict(findings: Findings) -> str:
         kinds[reading(statistic, difference)].append(measure_name(statistic))
     better, worse = (" and ".join(kinds[kind]) for kind in ("better", "worse"))
     on, these = f"on {best.held_out.scenarios} scenarios that the search never saw", f"the {findings.picked} constants"
+    but = _fewer_successes(best, findings.default, compared.success) + SEEN * (findings.picked == "chosen")
     if better and not worse:
-        return f"Yes: {on}, {these} are better in {better}; in nothing are they worse beyond chance."
+        return f"Yes: {on}, {these} are better in {better}; in nothing are they worse beyond chance.{but}"
     if better:
-        return f"In part: {on}, {these} are better in {better} and worse in {worse}."
+        return f"In part: {on}, {these} are better in {better} and worse in {worse}.{but}"
     if worse:
-        return f"No: {on}, {these} are worse in {worse} and better in nothing beyond chance."
-    return f"Not shown: {on}, no objective differs beyond chance from that of the default constants."
+        return f"No: {on}, {these} are worse in {worse} and better in nothing beyond chance.{but}"
+    return f"Not shown: {on}, no objective differs beyond chance from that of the default constants.{but}"
+
+
+def _fewer_successes(best: Member, default: Member, difference: Interval) -> str:
+    """What a loss of success that may be chance may be as much; empty where there is none."""
+    if best.held_out is None or default.held_out is None or not difference.value < 0.0 <= difference.high:
+        return ""
+    before, after = (100 * judged.success.value for judged in (default.held_out, best.held_out))
+    return (f" Success is {after:.1f} % in the place of {before:.1f} %: that may be chance, but these scenarios do not "
+            f"rule out a loss of {-100 * difference.low:.1f} points.")  # fmt: skip
 
 
 def reading(statistic: Statistic, difference: Interval) -> str:

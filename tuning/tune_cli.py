@@ -97,7 +97,10 @@ def status_lines(name: str, budget: int, events: list[dict[str, Any]], process: 
         lines.append("by " + ", ".join(f"{key} = {value:.4g}" for key, value in best["constants"].items()))
     blocks = _whole(events, "block")[-RECENT:]
     seconds = sum(block["seconds"] for block in blocks)
-    if seconds and not ended:
+    searched = any(event["event"] == "searched" for event in events)
+    if searched and not ended:
+        lines.append("the search has ended; the held-out scenarios are driven")
+    elif seconds and not ended:
         rate = sum(block["episodes"] for block in blocks) / seconds
         left = timedelta(seconds=round((budget - spent) / rate)) if rate else "unknown"
         lines.append(f"{rate:.0f} episodes a second; at most {left} left for the search")
@@ -112,9 +115,11 @@ def _whole(events: list[dict[str, Any]], kind: str) -> list[dict[str, Any]]:
 
 def _tell(folder: Path, findings: Findings, quiet: bool) -> None:
     from tuning.conclude_job import RECOMMENDED, success_lines
+    from tuning.report_summary import verdict
 
     if not quiet:
         print("\n".join(success_lines(findings)))
+        print(f"better? {verdict(findings)}")
         print(f"wrote {folder / 'report.html'} and {folder / RECOMMENDED}")
 
 

@@ -50,6 +50,34 @@ NEEDS = {
 }  # fmt: skip
 LARGEST = 1e6  # beyond it sums of weighted terms may leave float32
 UNITS = {name: "m/s" if name == "mover_growth" else "m" for name in BEHAVIOUR}  # of the constants; the others have none
+MEANINGS = {  # of every key; weights are of normalised terms
+    "local_heading": "weight α of eq. 9: facing the local target",
+    "clearance": "weight β of eq. 9: distance to obstacles",
+    "velocity": "weight γ of eq. 9: speed",
+    "global_heading": "weight δ of eq. 9: facing the goal",
+    "progress": "weight: way made along the route",
+    "on_route": "weight: staying near the route",
+    "contact_time": "weight: time until a mover would be touched",
+    "mover_clearance": "weight: distance to movers",
+    "forward": "weight: not driving in reverse",
+    "dense_base": "α of eq. 5, where obstacles are dense",
+    "dense_gain": "β of eq. 5, where obstacles are dense",
+    "sparse_base": "γ of eq. 5, where obstacles are sparse",
+    "sparse_gain": "δ of eq. 5, where obstacles are sparse",
+    "dense_ratio": "dense is from this P/Q on",
+    "sparse_ratio": "sparse is below this P/Q",
+    "clearance_cap": "[m] distance to obstacles counts no further",
+    "clearance_margin": "[m] key-point segments keep more than this from occupied cells",
+    "static_margin": "[m] kept from obstacles that stand, by a braking robot",
+    "mover_margin": "[m] kept from movers, by a braking robot",
+    "mover_growth": "[m/s] by which mover_margin grows with the time predicted",
+    "mover_cap": "[m] distance to movers counts no further",
+    "lookahead": "[m] to the local target, along the route",
+    "route_margin": "[m] a route's cells keep this much more than the radius from squares",
+    "v_samples": "count: speeds in the window",
+    "yaw_rate_samples": "count: yaw rates in the window",
+    "horizon_steps": "count: steps predicted",
+}
 Kind = TypeVar("Kind", ScoreWeights, WeightRule, Behaviour)
 
 
@@ -81,14 +109,14 @@ def load_weight_rule(path: Path) -> WeightRule:
 
 
 def weights_text(config: Preset) -> str:
-    """The TOML of every constant that has an effect, counts included, which `load_weights` reads back to the same
-    values.
+    """The TOML of every constant that has an effect, counts included, each with its meaning, which `load_weights` reads
+    back to the same values.
     """
     constants, options = config
     parts = ((constants.weights, SCORE), (constants.weight_rule, RULE), (constants.behaviour, BEHAVIOUR))
-    lines = [f"{key} = {_decimal(getattr(part, key))}" for part, keys in parts for key in keys
-             if in_use(key, options.rules)]  # fmt: skip
-    return "\n".join([*lines, *(f"{key} = {getattr(options.dwa, key)}" for key in COUNTS)]) + "\n"
+    values = {key: _decimal(getattr(part, key)) for part, keys in parts for key in keys if in_use(key, options.rules)}
+    values |= {key: str(getattr(options.dwa, key)) for key in COUNTS}
+    return "".join(f"{f'{key} = {value}':<28}# {MEANINGS[key]}\n" for key, value in values.items())
 
 
 def in_use(key: str, rules: Rules) -> bool:

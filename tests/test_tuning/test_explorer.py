@@ -4,6 +4,7 @@ import sys
 
 import pytest
 
+from scenarios.errors import InputError
 from tests.test_tuning.findings_by_hand import VALUES, evaluations, findings
 from tuning import explorer
 from tuning.report_interactive import front_plot, parallel_plot
@@ -37,11 +38,12 @@ def test_a_click_on_a_member_makes_it_the_picked_one_and_shows_it():
 
 
 @needs_widgets
-@pytest.mark.parametrize("name", ["candidates", "default constants"])
-def test_a_click_on_what_is_no_member_picks_nothing(name):
+def test_a_click_on_the_default_picks_nothing_and_candidates_take_no_clicks():
     shown = []
     picker = explorer.MemberPicker(findings(), evaluations(), shown.append)
-    click(picker, name, 0)
+    click(picker, "default constants", 0)
+    (candidates,) = (trace for trace in picker._shown.children[0].data if trace.name == "candidates")
+    assert (candidates.hoverinfo, candidates.hovertemplate) == ("skip", None)
     assert (picker.member, shown) == (1, [])
     assert picker._shown.children[1].value == explorer.LEFT_OUT
 
@@ -64,6 +66,9 @@ def test_brushed_ranges_list_the_members_that_pass_in_all_of_them():
                            "style_data": {"dimensions[1].constraintrange": [[0.0, 0.35]]}}  # fmt: skip
     rows = [row.split("</th>")[0] for row in table.value.split('<th scope="row">')[1:]]
     assert rows == ["1", "3", "default"]
+    plot._js2py_restyle = {"source_view_id": None, "style_traces": 0,
+                           "style_data": {"dimensions[1].constraintrange": [[0.32, 0.33]]}}  # fmt: skip
+    assert table.value == explorer.NONE_PASSES
 
 
 @needs_plotly
@@ -83,8 +88,13 @@ def test_a_member_passes_where_every_brushed_axis_lets_it(ranges, members):
 
 def test_without_plotly_the_pictures_stand_still_and_the_recommended_member_is_picked(monkeypatch):
     monkeypatch.setitem(sys.modules, "plotly", None)  # as if it were not installed
-    picker = explorer.MemberPicker(findings(), evaluations())
+    shown = []
+    picker = explorer.MemberPicker(findings(), evaluations(), shown.append)
     assert picker.member == 1
+    picker.choose(2)
+    assert (picker.member, shown) == (2, [2])
+    with pytest.raises(InputError, match=r"^member: 4; must be from 1 to 3; choose one of them$"):
+        picker.choose(4)
     assert [text.get_text() for text in picker._shown.axes[0].texts] == ["1", "2", "3"]
     assert explorer.brush_members(findings()).axes[0].get_xlabel() == ""
 

@@ -127,14 +127,16 @@ def test_the_comparison_rings_the_traditional_paths_danger_points_only():
     assert right.get_title() == "4 x 4, improved A*\n6.00 m, 1 breaking and 0 danger points"
 
 
-def test_comparisons_are_drawn_on_given_axes_each_with_a_legend_of_its_own():
+def test_comparisons_are_drawn_on_given_axes_with_one_legend_under_the_last():
     axes = new_figure((8.0, 8.0)).subplots(2, 2)
     compare_plans([Comparison("4 x 4", GRID, TRADITIONAL, IMPROVED)], axes[0])
     driven = Replay(SCENARIO, PLAN, episode_of(Outcome.REACHED), trace_of(), jackal())
     compare_drives({"one": driven, "other": driven}, axes=axes[1].tolist())
     assert [ax.get_title().split("\n")[0] for ax in axes[0]] == ["4 x 4, traditional A*", "4 x 4, improved A*"]
     assert [ax.get_title().split(":")[0] for ax in axes[1]] == ["one", "other"]
-    assert all(ax.get_legend() is not None for ax in axes.flat)
+    assert [ax.get_legend() is not None for ax in axes.flat] == [False, True] * 2
+    labels = [text.get_text() for text in axes[1, 1].get_legend().get_texts()]
+    assert len(labels) == len(set(labels)) > 5
     assert not axes[0, 0].get_figure().legends
 
 

@@ -139,6 +139,20 @@ def test_the_last_seconds_are_shown_around_the_robot(replayed):
     assert ax.get_title().startswith(f"{SUITE.names[0]}, ")
 
 
+def test_of_a_robot_that_stood_the_last_of_its_way_is_shown_however_long_ago(replayed):
+    driven = replayed["detour"]
+    robot, steps = driven.trace.robot, int(driven.trace.length)
+    stood = np.minimum(np.arange(len(robot.x)), steps - 40)  # for the last 39 steps, 3.9 s
+    robot = robot._replace(x=np.asarray(robot.x)[stood], y=np.asarray(robot.y)[stood])
+    standing = replace(driven, trace=driven.trace._replace(robot=robot))
+    ax = sheet(Cause.STUCK, Group([0], [standing]), SUITE, seconds=2.0).axes[0]
+    (line,) = (drawn for drawn in ax.collections if drawn.get_label() == "driven path")
+    segments = np.array(line.get_segments())
+    ways = np.hypot(*(segments[:, 1] - segments[:, 0]).T)
+    assert ways.sum() == pytest.approx(0.4, abs=ways.max())
+    assert (ways[-39:] == 0).all()
+
+
 def test_a_drive_shorter_than_that_is_shown_whole_and_none_as_the_map(replayed):
     ax = sheet(Cause.TIMEOUT, Group([3], [replayed["brief"]]), SUITE).axes[0]
     (line,) = (drawn for drawn in ax.collections if drawn.get_label() == "driven path")

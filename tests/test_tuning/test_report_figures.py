@@ -8,7 +8,7 @@ from scenarios.drawing import new_figure
 from tests.test_tuning.findings_by_hand import GOALS, PARAMETERS, VALUES, agreement, evaluations, findings
 from tuning.analysis import chosen_by_hand
 from tuning.evaluations import Evaluations
-from tuning.objectives import Goals, Statistic
+from tuning.objectives import Constraint, Goals, Statistic
 from tuning.report_figures import (
     agreement_figure,
     axis_label,
@@ -43,7 +43,7 @@ def drawn_points(ax, label):
 def test_labels_name_the_unit_and_what_is_better():
     assert axis_label(Statistic("success", "max")) == "success rate [%], more is better"
     assert axis_label(Statistic("time", "min", 0.1)) == "time (worst 10%) [s], less is better"
-    assert axis_label(Statistic("length_ratio", "min")) == "length ratio, less is better"
+    assert axis_label(Statistic("length_ratio", "min")) == "length ratio [1], less is better"
     assert in_units(Statistic("collision", "min"), 0.25) == 25.0
     assert in_units(Statistic("time", "min"), 0.25) == 0.25
 
@@ -53,7 +53,7 @@ def test_the_front_is_drawn_for_every_pair_of_objectives_with_default_and_recomm
     figure = front_figure(found, training)
     assert len(figure.axes) == 6
     first = figure.axes[0]
-    assert labels(figure)[0] == ("success rate [%], more is better", "length ratio, less is better")
+    assert labels(figure)[0] == ("success rate [%], more is better", "length ratio [1], less is better")
     best = found.front[0].training.objectives
     np.testing.assert_allclose(drawn_points(first, "recommended"), [[100 * best[0].value, best[1].value]])
     assert len(drawn_points(first, "front")) == 3
@@ -182,7 +182,8 @@ def test_random_candidates_are_no_sweep():
 def test_sweeps_have_a_row_a_parameter_and_a_column_an_objective_with_intervals(training):
     figure = sweep_figure(GOALS, training, sweeps(training))
     assert [across for across, _ in labels(figure)] == ["clearance"] * 4
-    assert [up for _, up in labels(figure)] == ["success rate [%]", "length ratio", "breaking points", "danger points"]
+    assert [up for _, up in labels(figure)] == [
+        "success rate [%]", "length ratio [1]", "breaking points [1]", "danger points [1]"]  # fmt: skip
     for ax in figure.axes:
         (curve, default) = ax.lines
         (band,) = ax.collections
@@ -203,6 +204,21 @@ def test_axes_that_are_given_are_drawn_on(training):
     front_figure(replace(findings(), goals=one, default=judged[0], front=tuple(judged[1:])), training, axes=axes[1, 2])
     assert [ax.has_data() for ax in axes.ravel()] == [True] * 7 + [False] + [True] * 8
     assert not axes[0, 0].get_figure().legends
+    labels = [text.get_text() for text in axes[1, 1].get_legend().get_texts()]  # of the front's last panel
+    assert sorted(labels) == sorted({"candidate", "front", "default constants", "recommended", "the same, held out"})
+
+
+def test_candidates_that_break_a_constraint_are_crosses(training):
+    found = replace(findings(), goals=replace(GOALS, constraints=(Constraint(Statistic("success", "max"), 0.9),)))
+    ax = front_figure(found, training).axes[0]
+    whole = training.complete
+    rate = 100 * (training.columns["outcome"][whole] == 0).mean(axis=1)
+    (dots,), (crosses,) = ([line for line in ax.lines if line.get_label() == kind]
+                           for kind in ("candidate", "breaks a constraint"))  # fmt: skip
+    for line, expected in ((dots, rate >= 90), (crosses, rate < 90)):
+        shown = line.get_xdata()[np.isfinite(line.get_xdata())]
+        assert set(shown) <= set(rate[expected])
+        assert len(shown)
 
 
 def test_hypervolume_holds_its_value_until_the_next_generation():

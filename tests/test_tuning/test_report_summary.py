@@ -52,11 +52,22 @@ def test_the_verdict_says_yes_in_part_no_or_not_shown():
     assert verdict(findings(held_out=False)).startswith("Not known:")
 
 
+def test_the_verdict_tells_a_loss_of_success_that_may_be_chance():
+    found = compared(Interval(-0.025, -0.135, 0.073), LESS, SAME, SAME)
+    before, after = (100 * member.held_out.success.value for member in (found.default, found.front[0]))
+    assert verdict(found).endswith(
+        f" Success is {after:.1f} % in the place of {before:.1f} %: that may be chance, but these scenarios do not "
+        "rule out a loss of 13.5 points.")
+    assert "Success is" not in verdict(compared(Interval(0.0, -0.1, 0.1), LESS, SAME, SAME))
+
+
 def test_the_verdict_on_a_choice_by_hand_does_not_call_it_recommended():
     found = compared(SAME, LESS, SAME, SAME)
     by_hand = replace(found, choices=(Choice(BY_HAND, 1, np.full(3, np.nan), "yours"),), recommended=0)
     assert "the chosen constants are better in length ratio; in nothing" in verdict(by_hand)
     assert "recommended" not in verdict(by_hand)
+    assert "Who chose them by these values has seen them" in verdict(by_hand)
+    assert "has seen them" not in verdict(found)
 
 
 def test_success_is_that_of_plans_where_nothing_was_driven():

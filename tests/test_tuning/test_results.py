@@ -52,6 +52,7 @@ def test_an_evaluation_opens_as_a_dataset_with_units_and_a_table():
     assert all(variable.long_name for variable in dataset.data_vars.values())
     assert dataset["outcome"].flag_meanings.split()[Outcome.HIT_MOVER] == "HIT_MOVER"
     assert dataset["feasibility"].flag_meanings.split() == [kind.name for kind in Feasibility]
+    assert dataset["success"].values.tolist() == [True, False, True, False]
     frame = dataset.to_dataframe()
     assert frame.index.tolist() == ["s-0", "s-1", "s-2", "s-3"]
     assert frame.loc["s-1", "time"] == 99.0

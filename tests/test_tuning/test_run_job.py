@@ -16,7 +16,7 @@ from scenarios.errors import InputError
 from scenarios.suite import make_suite
 from tests.test_tuning.jobs import CANDIDATES, JOB, SCENARIOS, in_small_pieces, pairs_driven, results_of, written
 from tuning import racing, tiled_judge
-from tuning.dataset import open_evaluations
+from tuning.dataset import front_dataset, open_evaluations
 from tuning.evaluate import evaluate
 from tuning.job_folder import events_of, locked
 from tuning.plans_only import PLANNED
@@ -109,6 +109,30 @@ def test_the_dataset_has_dimensions_units_and_a_table(whole):
     assert dict(open_evaluations(whole, "held_out").sizes)["scenario"] == 3
 
 
+def test_a_candidate_has_the_same_number_and_constants_in_both_parts(whole):
+    training, held_out = open_evaluations(whole), open_evaluations(whole, "held_out")
+    job = open_job(whole)
+    assert held_out["candidate"].values.tolist() == job.held_out_rows.tolist()
+    same = training.sel(candidate=held_out["candidate"])
+    for name in ("clearance", "velocity", "generation"):
+        assert same[name].values.tolist() == held_out[name].values.tolist()
+
+
+def test_the_front_opens_as_a_dataset_with_intervals_and_the_default_first(whole):
+    findings = open_job(whole).findings
+    dataset = front_dataset(findings)
+    assert dataset["member"].values.tolist() == list(range(len(findings.front) + 1))
+    assert dataset.attrs["recommended_member"] == findings.choices[findings.recommended].member + 1
+    frame = dataset.to_dataframe()
+    for number, member in enumerate((findings.default, *findings.front)):
+        assert frame.loc[number, ["clearance", "velocity"]].tolist() == member.values.tolist()
+        index = [statistic.label for statistic in findings.goals.objectives].index("length_ratio")
+        for suite, judged in (("training", member.training), ("held_out", member.held_out)):
+            ends = frame.loc[number, [f"length_ratio_{suite}{end}" for end in ("", "_low", "_high")]].tolist()
+            expected = [np.nan] * 3 if judged is None else list(judged.objectives[index])
+            np.testing.assert_array_equal(ends, expected)
+
+
 def test_a_job_has_no_other_parts_than_two(tmp_path):
     with pytest.raises(InputError, match=r"suite: 'heldout'; a job has the parts training and held_out; name one"):
         open_evaluations(tmp_path, "heldout")
@@ -118,7 +142,7 @@ def test_the_table_has_a_row_an_episode_under_its_candidate_and_scenario(whole):
     frame = open_evaluations(whole).to_dataframe()
     assert frame.index.names == ["candidate", "scenario"]
     assert len(frame) == CANDIDATES * SCENARIOS
-    assert {*FIGURES, "done", "generation", "clearance", "velocity"} == set(frame.columns)
+    assert {*FIGURES, "success", "done", "generation", "clearance", "velocity"} == set(frame.columns)
     found, (_, name, *_) = read_store(whole / "training.zarr")
     episode = frame.loc[(3, name)]
     assert episode["time"] == found.columns["time"][3, 1]

@@ -154,7 +154,9 @@ def test_what_is_written_is_read_back_to_the_same_numbers(tmp_path, rules):
     constants, options = preset(rules)
     constants = replace(constants, weights=replace(constants.weights, clearance=1 / 3))
     options = replace(options, dwa=replace(options.dwa, v_samples=7))
-    (tmp_path / "weights.toml").write_text(weights_text(Preset(constants, options)))
+    text = weights_text(Preset(constants, options))
+    assert all("  # " in line for line in text.splitlines())  # its meaning
+    (tmp_path / "weights.toml").write_text(text)
     loaded, counts = load_weights(tmp_path / "weights.toml", Preset(paper().constants, Options(rules=rules)))
     assert all(getattr(counts.dwa, name) == getattr(options.dwa, name) for name in COUNTS)
     for part in ("weights", "weight_rule", "behaviour"):
