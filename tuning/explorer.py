@@ -38,7 +38,8 @@ class MemberPicker:
         import ipywidgets
         import plotly.graph_objects as go
 
-        plot: Any = go.FigureWidget(front_plot(findings, training), layout={"width": WIDTH})
+        plot: Any = go.FigureWidget(front_plot(findings, training))
+        plot.layout.width = WIDTH
         for trace in plot.data:
             trace.on_click(self._clicked)
             if trace.name in (CANDIDATES, BREAKING):  # or they would catch clicks on members that lie on them
