@@ -128,6 +128,6 @@ def _last_seconds(driven: Replay, name: str, y_down: bool, ax: "Axes") -> Any:
 
 
 def _time_bar(shaded: Any, axes: list["Axes"], figure: "Figure") -> None:
-    bar = figure.colorbar(shaded, ax=axes, shrink=0.6, pad=0.02)
+    bar = figure.colorbar(shaded, ax=axes, shrink=0.6, pad=0.02, extend="min")
     bar.set_label("time before the end [s]", fontsize=FONT)
     bar.ax.tick_params(labelsize=FONT - 1)
