@@ -136,8 +136,8 @@ def _figures(dimensions: tuple[str, ...], columns: Mapping[str, np.ndarray]) -> 
     described = {name: (dimensions, values, _attributes(LONG_NAMES[name], UNITS.get(name)))
                  for name, values in columns.items()}  # fmt: skip
     outcome = columns["outcome"]
-    success = np.where(np.isnan(outcome), np.nan, outcome == Outcome.REACHED) if outcome.dtype.kind == "f" else (
-        outcome == Outcome.REACHED)  # fmt: skip
+    reached = outcome == Outcome.REACHED
+    success = reached if outcome.dtype.kind == "i" else np.where(np.isnan(outcome), np.nan, reached)
     return described | {"outcome": (dimensions, outcome, _flags(LONG_NAMES["outcome"], Outcome)),
                         "success": (dimensions, success, _attributes("whether the goal was reached"))}
 

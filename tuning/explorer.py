@@ -67,7 +67,7 @@ class MemberPicker:
     def _clicked(self, trace: Any, points: Any, state: Any) -> None:
         for index in points.point_inds[:1]:  # called for every trace, of which one was hit
             number = int(trace.customdata[index])
-            if number:
+            if number > 0:
                 self.choose(number)
             else:
                 self._output.clear_output()

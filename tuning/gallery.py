@@ -140,7 +140,7 @@ def sheet(cause: Cause, group: Group, suite: Suite, seconds: float = SECONDS, y_
     figure.suptitle(f"{heading}{separator}(x and y in metres)", fontsize=FONT + 2)
     figure_legend(figure, tiles[:count])
     if shaded is not None:
-        bar = figure.colorbar(shaded, ax=tiles, shrink=0.6, pad=0.01, extend="min")  # of a robot that stood, the way is older
+        bar = figure.colorbar(shaded, ax=tiles, shrink=0.6, pad=0.01, extend="min")
         bar.set_label("time before the end [s]", fontsize=FONT)
         bar.ax.tick_params(labelsize=FONT - 1)
     return figure
