@@ -156,7 +156,7 @@ def _scatter(kind: _Kind, across: int, up: int) -> Any:
 def _menu(axis: str, labels: list[str], kinds: list[_Kind], ranges: list[list[float]], active: int,
           place: float) -> dict[str, Any]:
     """A list of objectives for one axis."""
-    buttons = [{"label": f"{axis}: {label}", "method": "update",
+    buttons = [{"label": f"{axis}: {label.partition(' [')[0]}", "method": "update",
                 "args": [{axis: [_column(kind.points, index) for kind in kinds]},
                          {f"{axis}axis.title.text": label, f"{axis}axis.range": ranges[index]}]}
                for index, label in enumerate(labels)]  # fmt: skip
