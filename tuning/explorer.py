@@ -87,7 +87,7 @@ def brush_members(findings: Findings) -> Any:
     import plotly.graph_objects as go
 
     plot: Any = go.FigureWidget(parallel_plot(findings))
-    plot.layout.width = max(WIDTH, 80 * len(plot.data[0].dimensions) + 200)  # drawn out of sight, it would be narrow
+    plot.layout.width = max(WIDTH, 65 * len(plot.data[0].dimensions) + 200)  # drawn out of sight, it would be narrow
     table = ipywidgets.HTML(HOW_TO_BRUSH).add_class(LIKE_TABLES)
     lines = plot.data[0]
 
