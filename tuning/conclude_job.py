@@ -1,5 +1,6 @@
 """The end of a job: the best on held-out scenarios, the analysis, the recommended constants, the report."""
 
+import shlex
 import time
 from pathlib import Path
 from typing import Any
@@ -54,7 +55,7 @@ def recommended_text(setup: Setup, findings: Findings, preset: Preset, home: Pat
     """The recommended constants as a file of weights, with what is known of them. home: of the job file's paths."""
     choice, planner = findings.choices[findings.recommended], setup.job.planner
     robot = str(home / planner.robot) if planner.robot and planner.robot.endswith(SUFFIX) else planner.robot
-    options = [f"--preset {planner.preset}", *([f"--robot {robot}"] if robot else []),
+    options = [f"--preset {planner.preset}", *([f"--robot {shlex.quote(robot)}"] if robot else []),
                *([f"--v-max {planner.v_max:g}"] if planner.v_max else [])]  # fmt: skip
     lines = [f"Tuned by the job {setup.job.name!r}, by the rule {choice.rule}: {choice.reason}",
              *success_lines(findings), f"Use: adwa evaluate {' '.join(options)} --weights recommended.toml"]

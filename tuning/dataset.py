@@ -16,6 +16,7 @@ from tuning.findings import Findings, Interval
 from tuning.job_folder import HELD_OUT, TRAINING
 from tuning.results import Results
 from tuning.store import read_store
+from tuning.weights_file import MEANINGS
 from tuning.weights_file import UNITS as CONSTANT_UNITS
 
 if TYPE_CHECKING:
@@ -73,7 +74,7 @@ def open_evaluations(folder: str | Path, suite: str = "training") -> "xarray.Dat
     candidates = {
         "candidate": ("candidate", numbers, {"long_name": "candidate; 0: the default constants"}),
         "generation": ("candidate", found.generation, _attributes("generation that the candidate was asked for in")),
-        **{name: ("candidate", found.values[:, index], _attributes(name.replace("_", " "), CONSTANT_UNITS.get(name)))
+        **{name: ("candidate", found.values[:, index], _attributes(MEANINGS[name], CONSTANT_UNITS.get(name)))
            for index, name in enumerate(found.parameters)},
     }  # fmt: skip
     scenarios = {"scenario": ("scenario", list(names), {"long_name": f"scenario of the {suite} suites"})}
@@ -90,11 +91,11 @@ def front_dataset(findings: Findings) -> "xarray.Dataset":
     members = (findings.default, *findings.front)
     variables: dict[str, Any] = {
         name: ("member", np.array([member.values[index] for member in members]),
-               _attributes(name.replace("_", " "), CONSTANT_UNITS.get(name)))
+               _attributes(MEANINGS[name], CONSTANT_UNITS.get(name)))
         for index, name in enumerate(findings.parameters)
     }  # fmt: skip
     for suite in PARTS:
-        judged = [getattr(member, "training" if suite == "training" else "held_out") for member in members]
+        judged = [getattr(member, suite) for member in members]
         for index, statistic in enumerate(findings.goals.objectives):
             for end in Interval._fields:
                 values = [np.nan if one is None else getattr(one.objectives[index], end) for one in judged]

@@ -1,6 +1,7 @@
 """The front in a notebook that answers to the mouse: brush its members, click one to see all of it.
 
-Needs plotly and anywidget, the extra `explore`; without either the same pictures stand still.
+Needs plotly and anywidget, the extra `explore`; without anywidget plotly's figures answer by
+themselves, without plotly the pictures stand still.
 """
 
 from collections.abc import Callable
@@ -12,13 +13,13 @@ import numpy as np
 from scenarios.errors import InputError
 from tuning.evaluations import Evaluations
 from tuning.findings import Findings
-from tuning.report_figures import BREAKING, front_figure, parallel_figure
+from tuning.report_figures import VIOLATING, front_figure, parallel_figure
 from tuning.report_interactive import CANDIDATES, available, front_plot, parallel_plot
 from tuning.report_summary import front_table
 
 HOW_TO_BRUSH = "Drag along an axis: the members that pass there are listed here."
 NONE_PASSES = "No member passes in all of the brushed ranges."
-LEFT_OUT = "The default constants, with which the tables compare. Click a blue point, filled or hollow, or the star."
+DEFAULT_CLICKED = "The default constants, with which the tables compare. Click a blue point or the star."
 WIDTH = 900  # [px]
 LIKE_TABLES = "jp-RenderedHTMLCommon"  # the style of a notebook's tables
 
@@ -33,7 +34,8 @@ class MemberPicker:
         self._show, self._count = show, len(findings.front)
         self._output: Any = None
         if not clickable():
-            self._shown: Any = explored_front(findings, training)
+            self._shown: Any = (front_plot(findings, training) if available() else
+                                front_figure(findings, training, numbered=True))  # fmt: skip
             return
         import ipywidgets
         import plotly.graph_objects as go
@@ -42,7 +44,7 @@ class MemberPicker:
         plot.layout.width = WIDTH
         for trace in plot.data:
             trace.on_click(self._clicked)
-            if trace.name in (CANDIDATES, BREAKING):  # or they would catch clicks on members that lie on them
+            if trace.name in (CANDIDATES, VIOLATING):  # or they would catch clicks on members that lie on them
                 trace.update(hoverinfo="skip", hovertemplate=None)
         self._heading = ipywidgets.HTML("Click a member.")
         self._output = ipywidgets.Output()
@@ -71,7 +73,7 @@ class MemberPicker:
                 self.choose(number)
             else:
                 self._output.clear_output()
-                self._heading.value = LEFT_OUT
+                self._heading.value = DEFAULT_CLICKED
 
     def _ipython_display_(self) -> None:
         from IPython.display import display
@@ -82,7 +84,7 @@ class MemberPicker:
 def brush_members(findings: Findings) -> Any:
     """Parallel coordinates in which ranges of axes can be brushed, and below it the table of the members that pass."""
     if not clickable():
-        return explored_parallel(findings)
+        return parallel_plot(findings) if available() else parallel_figure(findings)
     import ipywidgets
     import plotly.graph_objects as go
 
@@ -109,16 +111,6 @@ def passing(dimensions: Any) -> list[int]:
             low, high = np.reshape(axis.constraintrange, (-1, 2)).T
             kept &= ((values >= low) & (values <= high)).any(axis=1)
     return [int(number) for number in np.asarray(dimensions[0]["values"])[kept] if number > 0]
-
-
-def explored_front(findings: Findings, training: Evaluations) -> Any:
-    """Without a click: a plotly figure whose axes can be chosen, or `front_figure` with the members' numbers."""
-    return front_plot(findings, training) if available() else front_figure(findings, training, numbered=True)
-
-
-def explored_parallel(findings: Findings) -> Any:
-    """Without a table: a plotly figure whose axes can be brushed, or `parallel_figure`."""
-    return parallel_plot(findings) if available() else parallel_figure(findings)
 
 
 def clickable() -> bool:

@@ -87,8 +87,8 @@ def worst(results: Results) -> list[int]:
         turn.append((seen.get(outcome, 0), index))
         seen[outcome] = seen.get(outcome, 0) + 1
     successes = np.flatnonzero(results.reached)
-    ratios = results.measures.get("length_ratio", results.measures.get("planned_length_ratio"))  # of plans, the latter
-    detours = successes[np.argsort(-np.asarray(ratios)[successes], kind="stable")]
+    ratio = "length_ratio" if "length_ratio" in results.measures else "planned_length_ratio"  # where nothing was driven
+    detours = successes[np.argsort(-results.measures[ratio][successes], kind="stable")]
     return [index for _, index in sorted(turn)] + detours.tolist()
 
 

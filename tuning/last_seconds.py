@@ -49,7 +49,8 @@ def draw_last_seconds(driven: Replay, ax: "Axes", seconds: float = 4.0, title: s
     ax.set_facecolor(OCCUPIED)  # beyond the map
     first = max(steps - round(seconds / step_of(driven)), 0) if steps else 0
     whole = driven_path(scenario, trace)
-    path = whole[min(first, _begins(whole)) :]
+    begins = min(first, _begins(whole))
+    path = whole[begins:]
     if steps:
         _crop(path, ax, y_down)
         scenario = _squares_in_view(scenario, ax)
@@ -63,11 +64,10 @@ def draw_last_seconds(driven: Replay, ax: "Axes", seconds: float = 4.0, title: s
     ax.set(xlabel="", ylabel="")
     if not steps:
         return None
-    times = (np.arange(first, steps + 1) - steps) * step_of(driven)
+    times = (np.arange(begins, steps + 1) - steps) * step_of(driven)
     shades = {"cmap": COLOURS, "vmin": -seconds, "vmax": 0.0}
-    _draw_movers(driven, first, times, ax, shades)
-    since = (np.arange(-len(path) + 1, 1)) * step_of(driven)
-    shaded = _draw_trail(path, since, ax, shades, width=3.0)
+    _draw_movers(driven, first, times[first - begins :], ax, shades)
+    shaded = _draw_trail(path, times, ax, shades, width=3.0)
     shaded.set_label("driven path")
     _draw_robot(driven, path[-1], ax)
     _list_what_is_in_view(ax)

@@ -2,7 +2,7 @@
 optimism gap, gradient agreement.
 
 Findings in, matplotlib figures out. Conventions: `scenarios.drawing`. `ax`, or
-`axes` where a figure has several panels, may be given: each then has a legend of its own.
+`axes` where a figure has several panels, may be given: the legend is then under the last of them.
 Dimension letters: D parameters; O objectives; N members; W candidates; G generations; S starts of the gradient method.
 """
 
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 COLUMNS = 3  # panels side by side
 GREY = "#999999"
-BREAKING = "breaks a constraint"
+VIOLATING = "breaks a constraint"
 COLOURS = "cividis"  # equal steps in lightness: also for the colour-blind, and in grey
 SEED = 0  # of the resamples behind the intervals of a sweep
 DEFAULT = {"marker": "s", "markersize": 7, "color": BLACK}
@@ -115,11 +115,13 @@ def front_figure(findings: Findings, training: Evaluations | None = None, number
         return _single_objective(findings, training, axes)
     pairs = list(combinations(range(len(objectives)), 2))
     panels = _panels(len(pairs), height=3.0) if axes is None else panels_of(axes, len(pairs))
-    cloud = candidate_objectives(findings.goals, training) if training is not None else None
+    cloud = None if training is None else (candidate_objectives(findings.goals, training),
+                                           violating(findings.goals, training))  # fmt: skip
     for ax, (across, up) in zip(panels, pairs, strict=True):
         _show_members(findings, across, up, ax)
-        if training is not None and cloud is not None:
-            _draw_candidates(cloud[:, [across, up]], breaking(findings.goals, training), ax)
+        if cloud is not None:
+            points, violates = cloud
+            _draw_candidates(points[:, [across, up]], violates, ax)
         _draw_members(findings, across, up, ax)
         if numbered:
             _number_members(findings, across, up, ax)
@@ -349,11 +351,11 @@ def candidate_objectives(goals: Goals, evaluations: Evaluations) -> np.ndarray:
                      for statistic in goals.objectives], axis=1)  # fmt: skip
 
 
-def breaking(goals: Goals, evaluations: Evaluations) -> np.ndarray:
+def violating(goals: Goals, evaluations: Evaluations) -> np.ndarray:
     """[W'] bool: which of those candidates break a constraint."""
     whole = evaluations.rows(evaluations.complete)
-    broken = goals.scores(whole.columns, whole.done).violation > 0.0
-    return broken if goals.constraints else np.zeros_like(broken)
+    violates = goals.scores(whole.columns, whole.done).violation > 0.0
+    return violates if goals.constraints else np.zeros_like(violates)
 
 
 def _panels(count: int, height: float, columns: int = COLUMNS) -> list["Axes"]:
@@ -451,12 +453,12 @@ def _show_members(findings: Findings, across: int, up: int, ax: "Axes") -> None:
         limits(*view_of(statistic, values))
 
 
-def _draw_candidates(points: np.ndarray, broken: np.ndarray, ax: "Axes") -> None:
-    """Those [W, 2] within the view; one beyond it is left out rather than cut at the frame. broken: [W] bool."""
+def _draw_candidates(points: np.ndarray, violates: np.ndarray, ax: "Axes") -> None:
+    """Those [W, 2] within the view; one beyond it is left out rather than cut at the frame. violates: [W] bool."""
     low, high = np.array([ax.get_xlim(), ax.get_ylim()]).T
     within = ((points >= low) & (points <= high)).all(axis=1)
-    for kind, marker, shown in (("candidate", ".", within & ~broken), (BREAKING, "x", within & broken)):
-        if shown.any() or kind != BREAKING:
+    for kind, marker, shown in (("candidate", ".", within & ~violates), (VIOLATING, "x", within & violates)):
+        if shown.any() or kind != VIOLATING:
             ax.plot(*np.where(shown[:, None], points, np.nan).T, linestyle="none", marker=marker, markersize=4,
                     color=GREY, zorder=1, clip_on=False, label=kind)  # fmt: skip
 

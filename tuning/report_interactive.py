@@ -16,10 +16,9 @@ from tuning.evaluations import Evaluations
 from tuning.findings import Findings, Judgement, Member
 from tuning.objectives import Goals, Statistic
 from tuning.report_figures import (
-    BREAKING,
     GREY,
+    VIOLATING,
     axis_label,
-    breaking,
     candidate_objectives,
     in_units,
     line_colours,
@@ -30,6 +29,7 @@ from tuning.report_figures import (
     telling_objectives,
     unit_of,
     view_of,
+    violating,
 )
 
 PLACE = "front-plot"  # id of the plot's element
@@ -60,15 +60,16 @@ def front_plot(findings: Findings, training: Evaluations) -> Any:
     kinds = _kinds(findings, training)
     across, up = sorted((telling_objectives(findings) * 2)[:2])
     figure = go.Figure([_scatter(kind, across, up) for kind in kinds])
-    labels = [axis_label(statistic) for statistic in findings.goals.objectives]
-    ranges = [_range(statistic, kinds, index) for index, statistic in enumerate(findings.goals.objectives)]
+    objectives = findings.goals.objectives
+    ranges = [_range(statistic, kinds, index) for index, statistic in enumerate(objectives)]
     figure.update_layout(
         template="plotly_white", height=520, margin={"l": 60, "r": 20, "t": 70, "b": 60}, hovermode="closest",
         paper_bgcolor="white", legend={"orientation": "h", "y": -0.16},
         hoverlabel={"align": "left", "bgcolor": "white", "font": {"color": BLACK}},
-        xaxis={"title": {"text": labels[across]}, "range": ranges[across]},
-        yaxis={"title": {"text": labels[up]}, "range": ranges[up]},
-        updatemenus=[_menu("x", labels, kinds, ranges, across, 0.0), _menu("y", labels, kinds, ranges, up, 0.5)],
+        xaxis={"title": {"text": axis_label(objectives[across])}, "range": ranges[across]},
+        yaxis={"title": {"text": axis_label(objectives[up])}, "range": ranges[up]},
+        updatemenus=[_menu("x", objectives, kinds, ranges, across, 0.0),
+                     _menu("y", objectives, kinds, ranges, up, 0.5)],
     )  # fmt: skip
     return figure
 
@@ -113,8 +114,8 @@ def _kinds(findings: Findings, training: Evaluations) -> list[_Kind]:
     others = [member for member in findings.front if member.row not in (best.row, default.row)]
     rest = np.isin(np.flatnonzero(training.complete), [member.row for member in (*others, best, default)], invert=True)
     texts = np.array([_constants(findings, values) for values in training.values[training.complete]], object)
-    points, broken, kinds = candidate_objectives(goals, training), breaking(goals, training), []
-    for name, chosen, symbol in ((CANDIDATES, rest & ~broken, "circle"), (BREAKING, rest & broken, "x-thin-open")):
+    points, violates, kinds = candidate_objectives(goals, training), violating(goals, training), []
+    for name, chosen, symbol in ((CANDIDATES, rest & ~violates, "circle"), (VIOLATING, rest & violates, "x-thin-open")):
         if chosen.any() or name == CANDIDATES:
             style = {"color": GREY, "size": 5, "symbol": symbol}
             kinds.append(_Kind(name, points[chosen], texts[chosen].tolist(), [-1] * int(chosen.sum()), style))
@@ -153,19 +154,19 @@ def _scatter(kind: _Kind, across: int, up: int) -> Any:
                       hovertemplate=f"<b>{kind.name}</b><br>%{{text}}<extra></extra>")  # fmt: skip
 
 
-def _menu(axis: str, labels: list[str], kinds: list[_Kind], ranges: list[list[float]], active: int,
+def _menu(axis: str, objectives: Sequence[Statistic], kinds: list[_Kind], ranges: list[list[float]], active: int,
           place: float) -> dict[str, Any]:
     """A list of objectives for one axis."""
-    buttons = [{"label": f"{axis}: {label.partition(' [')[0]}", "method": "update",
+    buttons = [{"label": f"{axis}: {measure_name(statistic)}", "method": "update",
                 "args": [{axis: [_column(kind.points, index) for kind in kinds]},
-                         {f"{axis}axis.title.text": label, f"{axis}axis.range": ranges[index]}]}
-               for index, label in enumerate(labels)]  # fmt: skip
+                         {f"{axis}axis.title.text": axis_label(statistic), f"{axis}axis.range": ranges[index]}]}
+               for index, statistic in enumerate(objectives)]  # fmt: skip
     return {"buttons": buttons, "active": active, "x": place, "xanchor": "left", "y": 1.14, "yanchor": "top"}
 
 
 def _range(statistic: Statistic, kinds: list[_Kind], index: int) -> list[float]:
     """Of an axis: that of the members, as candidates far off would press them into a corner."""
-    values = np.concatenate([kind.points[:, index] for kind in kinds if kind.name not in (CANDIDATES, BREAKING)])
+    values = np.concatenate([kind.points[:, index] for kind in kinds if kind.name not in (CANDIDATES, VIOLATING)])
     return list(view_of(statistic, values, share=0.1))
 
 

@@ -43,7 +43,7 @@ def verdict(findings: Findings) -> str:
 
 
 def _fewer_successes(best: Member, default: Member, difference: Interval) -> str:
-    """What a loss of success that may be chance may be as much; empty where there is none."""
+    """Where success is less than before, but may be so by chance: how much less it may be. Else empty."""
     if best.held_out is None or default.held_out is None or not difference.value < 0.0 <= difference.high:
         return ""
     before, after = (100 * judged.success.value for judged in (default.held_out, best.held_out))

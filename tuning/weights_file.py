@@ -66,14 +66,14 @@ MEANINGS = {  # of every key; weights are of normalised terms
     "sparse_gain": "δ of eq. 5, where obstacles are sparse",
     "dense_ratio": "dense is from this P/Q on",
     "sparse_ratio": "sparse is below this P/Q",
-    "clearance_cap": "[m] distance to obstacles counts no further",
-    "clearance_margin": "[m] key-point segments keep more than this from occupied cells",
-    "static_margin": "[m] kept from obstacles that stand, by a braking robot",
-    "mover_margin": "[m] kept from movers, by a braking robot",
-    "mover_growth": "[m/s] by which mover_margin grows with the time predicted",
-    "mover_cap": "[m] distance to movers counts no further",
-    "lookahead": "[m] to the local target, along the route",
-    "route_margin": "[m] a route's cells keep this much more than the radius from squares",
+    "clearance_cap": "distance to obstacles counts no further",
+    "clearance_margin": "key-point segments keep more than this from occupied cells",
+    "static_margin": "kept from obstacles that stand, by a braking robot",
+    "mover_margin": "kept from movers, by a braking robot",
+    "mover_growth": "growth of mover_margin with the time predicted",
+    "mover_cap": "distance to movers counts no further",
+    "lookahead": "to the local target, along the route",
+    "route_margin": "a route's cells keep this much more than the radius from squares",
     "v_samples": "count: speeds in the window",
     "yaw_rate_samples": "count: yaw rates in the window",
     "horizon_steps": "count: steps predicted",
@@ -116,7 +116,8 @@ def weights_text(config: Preset) -> str:
     parts = ((constants.weights, SCORE), (constants.weight_rule, RULE), (constants.behaviour, BEHAVIOUR))
     values = {key: _decimal(getattr(part, key)) for part, keys in parts for key in keys if in_use(key, options.rules)}
     values |= {key: str(getattr(options.dwa, key)) for key in COUNTS}
-    return "".join(f"{f'{key} = {value}':<28}# {MEANINGS[key]}\n" for key, value in values.items())
+    units = {key: f" [{UNITS[key]}]" if key in UNITS else "" for key in values}
+    return "".join(f"{f'{key} = {value}':<28}# {MEANINGS[key]}{units[key]}\n" for key, value in values.items())
 
 
 def in_use(key: str, rules: Rules) -> bool:

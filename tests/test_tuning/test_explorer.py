@@ -45,7 +45,7 @@ def test_a_click_on_the_default_picks_nothing_and_candidates_take_no_clicks():
     (candidates,) = (trace for trace in picker._shown.children[0].data if trace.name == "candidates")
     assert (candidates.hoverinfo, candidates.hovertemplate) == ("skip", None)
     assert (picker.member, shown) == (1, [])
-    assert picker._shown.children[1].value == explorer.LEFT_OUT
+    assert picker._shown.children[1].value == explorer.DEFAULT_CLICKED
 
 
 @needs_widgets

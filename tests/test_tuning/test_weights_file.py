@@ -9,8 +9,10 @@ from adwa_jax.presets import Preset, extended, paper, preset
 from adwa_jax.rules import EVERY_RULE, Rules
 from adwa_jax.score import ScoreWeights
 from scenarios.errors import InputError
+from tuning import weights_file
 from tuning.weights_file import (
     COUNTS,
+    MEANINGS,
     NEEDS,
     in_use,
     load_weight_rule,
@@ -154,6 +156,7 @@ def test_what_is_written_is_read_back_to_the_same_numbers(tmp_path, rules):
     constants, options = preset(rules)
     constants = replace(constants, weights=replace(constants.weights, clearance=1 / 3))
     options = replace(options, dwa=replace(options.dwa, v_samples=7))
+    assert set(MEANINGS) == {*weights_file.SCORE, *weights_file.RULE, *weights_file.BEHAVIOUR, *COUNTS}
     text = weights_text(Preset(constants, options))
     assert all("  # " in line for line in text.splitlines())  # its meaning
     (tmp_path / "weights.toml").write_text(text)
